@@ -1,0 +1,25 @@
+"""coramp: cooperative on-ramp merging, planned, proved safe, driven in SUMO, compared.
+
+>>> import coramp
+>>> plan = coramp.plan("example")
+>>> plan.decisions["front_vehicle_id"].item()
+'m4'
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from coramp.errors import CorampError
+
+if TYPE_CHECKING:
+    from coramp.api import PlanResult, RunResult, StudyResult, plan, run, study
+
+__all__ = ["CorampError", "PlanResult", "RunResult", "StudyResult", "plan", "run", "study"]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the API at its first use, so that ``import coramp`` and ``--help`` stay quick."""
+    if name in __all__:
+        from coramp import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'coramp' has no attribute {name!r}")

@@ -1,0 +1,56 @@
+"""The one way a function becomes a compiled kernel.
+
+A kernel is plain Python on floats, tuples and arrays that numba compiles at its first call.
+Machine code is cached in a directory named after a hash of all kernels' sources, because numba by
+itself recompiles a function when its own file changes, but not when a kernel that it calls does.
+"""
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+def kernel(function: Function) -> Function:
+    """Returns ``function`` compiled by numba on its first call, its machine code cached on disk."""
+    settings: Any = numba.config
+    previous = settings.CACHE_DIR
+    settings.CACHE_DIR = str(_cache_directory())
+    try:
+        compiled: Any = numba.njit(cache=True)(function)
+    except RuntimeError:  # nowhere to write the cache: compile in each process
+        compiled = numba.njit(function)
+    finally:
+        settings.CACHE_DIR = previous
+    return compiled  # type: ignore[no-any-return]
+
+
+@cache
+def _cache_directory() -> Path:
+    package = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if b"@kernel" in text:
+            digest.update(text)
+    root = package / "__pycache__"
+    if not os.access(root if root.exists() else package, os.W_OK):
+        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "coramp"
+    directory = root / f"kernels-{digest.hexdigest()[:16]}"
+    if not directory.exists():
+        for outdated in root.glob("kernels-*"):
+            shutil.rmtree(outdated, ignore_errors=True)
+    return directory

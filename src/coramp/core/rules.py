@@ -1,0 +1,83 @@
+"""What a road, a vehicle and a controller may do: the constants that every kernel is given."""
+
+from typing import NamedTuple
+
+
+class Road(NamedTuple):
+    """One mainline lane, one ramp and the acceleration lane between them.
+
+    Stations are metres of a front bumper along the mainline, 0 at the end of the ramp (the nose),
+    growing downstream; the ramp has negative stations of its own, the acceleration lane positive
+    ones that run beside the mainline's.
+    """
+
+    mainline_start_m: float
+    mainline_end_m: float
+    ramp_start_m: float
+    decision_station_m: float
+    stop_station_m: float
+    acceleration_lane_m: float
+    last_merge_station_m: float
+    mainline_speed_mps: float
+    ramp_speed_mps: float
+    ramp_limit_mps: float
+    merge_angle_rad: float
+
+
+class SafetyBudget(NamedTuple):
+    """The errors and road conditions that the safe distance of Eq. 1 is made of.
+
+    ``time_gap_s`` is an optional addition of ``time_gap_s`` times the follower's speed, 0 in the
+    paper. ``execution_allowance_m`` is what planning adds for each pair so that the driven
+    positions keep Eq. 1; it is no part of the safe distance itself.
+    """
+
+    positioning_error_m: float
+    clock_error_s: float
+    adhesion: float
+    resistance: float
+    time_gap_s: float
+    execution_allowance_m: float
+
+
+class MotionLimits(NamedTuple):
+    """Accelerations in m/s2, all positive, and how far speed may leave v0 while a gap is made.
+
+    ``speed_up_mps2`` and ``slow_down_mps2`` bring vehicles to the common speed of their lane.
+    ``comfort_mps2`` (0.3 g) binds everyone, and stops before the nose, but for a ramp vehicle that
+    speeds up, which is bound by ``ramp_acceleration_mps2`` (6). ``free_acceleration_mps2`` is that
+    of free movement (Eq. 12). ``speed_deviation`` is a fraction of v0.
+    """
+
+    speed_up_mps2: float
+    slow_down_mps2: float
+    comfort_mps2: float
+    ramp_acceleration_mps2: float
+    free_acceleration_mps2: float
+    speed_deviation: float
+    slowest_ramp_speed_mps: float
+
+
+class Control(NamedTuple):
+    """The control clock and the readings of the paper that a scenario may choose.
+
+    ``gap_at_front`` pins a merging vehicle to the tail of the gap's front vehicle, as Eq. 29 does;
+    otherwise it takes the acceleration nearest to that of free movement. ``create_from_nose``
+    starts gap creation when the ramp vehicle passes the nose, as Eq. 34 does; otherwise it starts
+    with the decision.
+    """
+
+    step_s: float
+    actuation_delay_s: float
+    retry_s: float
+    gap_at_front: bool
+    create_from_nose: bool
+
+
+class Rules(NamedTuple):
+    """Everything a planner is bound by."""
+
+    road: Road
+    safety: SafetyBudget
+    motion: MotionLimits
+    control: Control
