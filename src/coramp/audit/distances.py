@@ -1,0 +1,167 @@
+"""The checker's own reading of the safe distance and of trajectories made of pieces.
+
+A trajectory is an array of shape (n, 4): time (s), station (m), speed (m/s) and acceleration
+(m/s2) at the start of each piece, the last of which lasts for ever.
+"""
+
+import math
+from typing import NamedTuple
+
+from coramp._kernel import FloatArray, kernel
+
+
+class Bounds(NamedTuple):
+    """What no plan may exceed; SI units, all positive but ``stop_station_m``."""
+
+    zone_end_m: float
+    stop_station_m: float
+    last_merge_station_m: float
+    mainline_speed_mps: float
+    ramp_limit_mps: float
+    cos_merge_angle: float
+    positioning_error_m: float
+    clock_error_s: float
+    friction: float
+    time_gap_s: float
+    allowance_m: float
+    comfort_mps2: float
+    ramp_acceleration_mps2: float
+    gap_speed_factor: float
+
+
+@kernel
+def state_at(pieces: FloatArray, time_s: float) -> tuple[float, float, float]:
+    """Returns station (m), speed (m/s) and acceleration (m/s2) at ``time_s``."""
+    k = 0
+    while k + 1 < pieces.shape[0] and pieces[k + 1, 0] <= time_s:
+        k += 1
+    dt = time_s - pieces[k, 0]
+    a = pieces[k, 3]
+    return pieces[k, 1] + pieces[k, 2] * dt + a * dt * dt / 2.0, pieces[k, 2] + a * dt, a
+
+
+@kernel
+def next_knot_s(pieces: FloatArray, time_s: float) -> float:
+    """Returns the first knot after ``time_s``, infinity if there is none."""
+    for k in range(pieces.shape[0]):
+        if pieces[k, 0] > time_s:
+            return float(pieces[k, 0])
+    return math.inf
+
+
+@kernel
+def passes_s(pieces: FloatArray, station_m: float) -> float:
+    """Returns when a vehicle that never drives backwards passes a station, infinity if never."""
+    for k in range(pieces.shape[0]):
+        _, s, v, a = pieces[k]
+        lasts_s = math.inf if k + 1 == pieces.shape[0] else pieces[k + 1, 0] - pieces[k, 0]
+        way_m = station_m - s
+        if way_m <= 0.0:
+            return float(pieces[k, 0])
+        if abs(a) < 1e-12:
+            after_s = way_m / v if v > 0.0 else math.inf
+        else:
+            under = v * v + 2.0 * a * way_m
+            after_s = (math.sqrt(under) - v) / a if under >= 0.0 else math.inf
+        if 0.0 <= after_s <= lasts_s:
+            return float(pieces[k, 0] + after_s)
+    return math.inf
+
+
+@kernel
+def following_distance_m(v_front: float, v_rear: float, bounds: Bounds) -> float:
+    """Returns 2 L_1 + L_2 + L_3 in m (Eq. 1-3, speeds in m/s), plus the optional time gap."""
+    closing_km_h = 3.6 * (v_rear - v_front)
+    braking_m = closing_km_h**2 / (254.0 * bounds.friction) if closing_km_h > 0.0 else 0.0
+    clock_m = bounds.clock_error_s * (v_front + v_rear)
+    return 2.0 * bounds.positioning_error_m + clock_m + braking_m + bounds.time_gap_s * v_rear
+
+
+@kernel
+def lane_change_distance_m(v_merging: float, v_other: float, bounds: Bounds) -> float:
+    """Returns L_r-X, L_r-Y in m (Eq. 15, 16, speeds in m/s)."""
+    along_km_h = 3.6 * (v_merging * bounds.cos_merge_angle - v_other)
+    return 2.0 * bounds.positioning_error_m + along_km_h**2 / (254.0 * bounds.friction)
+
+
+@kernel
+def margin_at_m(
+    front: FloatArray, front_length_m: float, rear: FloatArray, time_s: float, bounds: Bounds
+) -> float:
+    """Returns the bumper distance less the safe distance of Eq. 1 (m) at one moment."""
+    s_front, v_front, _ = state_at(front, time_s)
+    s_rear, v_rear, _ = state_at(rear, time_s)
+    return s_front - front_length_m - s_rear - following_distance_m(v_front, v_rear, bounds)
+
+
+@kernel
+def least_between_m(
+    front: FloatArray,
+    front_length_m: float,
+    rear: FloatArray,
+    start_s: float,
+    end_s: float,
+    bounds: Bounds,
+) -> float:
+    """Returns the least margin (m) on a span without knots and without a change of who is faster.
+
+    There the margin is a parabola in time; three of its values give its vertex.
+    """
+    middle_s = 0.5 * (start_s + end_s)
+    at_start = margin_at_m(front, front_length_m, rear, start_s, bounds)
+    at_middle = margin_at_m(front, front_length_m, rear, middle_s, bounds)
+    # the end belongs to the next piece; approach it from this one
+    s_front, v_front, a_front = state_at(front, start_s)
+    s_rear, v_rear, a_rear = state_at(rear, start_s)
+    dt = end_s - start_s
+    at_end = (
+        s_front
+        + v_front * dt
+        + a_front * dt * dt / 2.0
+        - front_length_m
+        - (s_rear + v_rear * dt + a_rear * dt * dt / 2.0)
+        - following_distance_m(v_front + a_front * dt, v_rear + a_rear * dt, bounds)
+    )
+    least = min(at_start, at_end)
+    bend = at_start - 2.0 * at_middle + at_end
+    if bend > 0.0:
+        vertex = (at_start - at_end) / (2.0 * bend)  # -1 at the start, 1 at the end
+        if abs(vertex) < 1.0:
+            least = min(least, at_middle - 0.5 * bend * vertex * vertex)
+    return least
+
+
+@kernel
+def least_margin_m(
+    front: FloatArray,
+    front_length_m: float,
+    rear: FloatArray,
+    start_s: float,
+    end_s: float,
+    bounds: Bounds,
+) -> float:
+    """Returns the least margin (m) over Eq. 1 in [start, end]; ``end_s`` may be infinite.
+
+    Minus infinity where the vehicles close in on each other for ever. Infinity for an empty span.
+    """
+    least = math.inf
+    if end_s < start_s:
+        return least
+    now_s = start_s
+    while True:
+        until_s = min(end_s, next_knot_s(front, now_s), next_knot_s(rear, now_s))
+        _, v_front, a_front = state_at(front, now_s)
+        _, v_rear, a_rear = state_at(rear, now_s)
+        opening, opening_rate = v_front - v_rear, a_front - a_rear
+        if opening_rate != 0.0:
+            equal_s = now_s - opening / opening_rate
+            if now_s + 1e-9 < equal_s < until_s - 1e-9:
+                until_s = equal_s
+        if math.isinf(until_s):
+            if abs(opening_rate) > 1e-12 or opening < -1e-9:
+                return -math.inf
+            return min(least, margin_at_m(front, front_length_m, rear, now_s, bounds))
+        least = min(least, least_between_m(front, front_length_m, rear, now_s, until_s, bounds))
+        if until_s >= end_s:
+            return least
+        now_s = until_s
