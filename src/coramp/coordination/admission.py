@@ -1,0 +1,237 @@
+"""How a vehicle enters: harmonised to its lane's speed as early as its leaders allow, or not yet.
+
+A mainline vehicle is brought to v0, a ramp vehicle to v_R0 with a stop before the nose. It may
+have to brake first, as briefly as is safe; where even a full stop is not safe it waits outside.
+"""
+
+import math
+
+import numpy as np
+
+from coramp._kernel import FloatArray, IntArray, kernel
+from coramp.core.approach import (
+    append_stop,
+    approach_without_stop,
+    harmonise,
+    stop_starts_s,
+)
+from coramp.core.fleet import (
+    MAX_CHANGED,
+    ROUNDING_M,
+    Fleet,
+    Proposal,
+    committed,
+    empty_proposal,
+    pair_margin_m,
+    trajectory_under,
+)
+from coramp.core.proposals import largest_safe_distance_m
+from coramp.core.rules import Rules
+from coramp.core.safe_distance import safe_distance_m
+from coramp.core.trajectory import (
+    MAX_PIECES,
+    STATION,
+    intercept_range_m,
+    station_and_speed,
+    time_at_station,
+)
+
+BISECTIONS = 40
+LEAST_MOVE_M = 1.0
+"""Places that would move up by less are left alone."""
+
+
+@kernel
+def plan_entry(
+    fleet: Fleet,
+    length_m: float,
+    on_ramp: bool,
+    time_s: float,
+    station_m: float,
+    speed_mps: float,
+    rules: Rules,
+) -> FloatArray:
+    """Returns the trajectory with which a vehicle enters now, of length 0 if it must wait."""
+    out = np.empty((MAX_PIECES, 4))
+    stop_m = stop_behind_m(fleet, rules) if on_ramp else math.inf
+    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, 0.0, stop_m, rules)
+    if safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
+        return out[:n]
+    shortest_s, longest_s = 0.0, speed_mps / rules.motion.slow_down_mps2
+    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, longest_s, stop_m, rules)
+    if not safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
+        return out[:0]
+    for _ in range(BISECTIONS):
+        brake_s = 0.5 * (shortest_s + longest_s)
+        n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, brake_s, stop_m, rules)
+        if safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
+            longest_s = brake_s
+        else:
+            shortest_s = brake_s
+    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, longest_s, stop_m, rules)
+    return out[:n]
+
+
+@kernel
+def entry_with_brake(
+    out: FloatArray,
+    on_ramp: bool,
+    time_s: float,
+    station_m: float,
+    speed_mps: float,
+    brake_s: float,
+    stop_m: float,
+    rules: Rules,
+) -> int:
+    """Writes the entry that brakes for ``brake_s``; returns its length, 0 if it stops too late."""
+    road = rules.road
+    n = harmonise(
+        out,
+        time_s,
+        station_m,
+        speed_mps,
+        rules.control.actuation_delay_s,
+        brake_s,
+        road.ramp_speed_mps if on_ramp else road.mainline_speed_mps,
+        rules.motion,
+    )
+    if on_ramp:
+        return append_stop(out, n, stop_m, rules.motion.comfort_mps2)
+    return n
+
+
+@kernel
+def stop_behind_m(fleet: Fleet, rules: Rules) -> float:
+    """Returns where the next ramp vehicle must be able to stop: before the nose, or another."""
+    stop_m = rules.road.stop_station_m
+    standing_m = safe_distance_m(0.0, 0.0, rules.safety) + rules.safety.execution_allowance_m
+    for row in fleet.live:
+        if fleet.merge_time_s[row] == math.inf:
+            behind_m = stop_of_m(committed(fleet, row)) - fleet.length_m[row] - standing_m
+            stop_m = min(stop_m, behind_m)
+    return stop_m
+
+
+@kernel
+def stop_of_m(pieces: FloatArray) -> float:
+    """Returns the station (m) at which a trajectory that ends in a stand does so."""
+    return float(pieces[len(pieces) - 1, STATION])
+
+
+@kernel
+def plan_moving_up(fleet: Fleet, from_s: float, rules: Rules) -> Proposal:
+    """Returns new trajectories for ramp vehicles whose stop can move up behind those before them.
+
+    Each vehicle without a committed merge must be able to stop behind the one before it. As those
+    at the head merge, the places move up; a vehicle is only asked to when its own stop is near.
+    """
+    proposal = empty_proposal()
+    rows = undecided_in_lane_order(fleet, from_s)
+    standing_m = safe_distance_m(0.0, 0.0, rules.safety) + rules.safety.execution_allowance_m
+    place_m = rules.road.stop_station_m
+    for k in range(len(rows)):
+        row, entry = rows[k], proposal.size[0]
+        if entry == MAX_CHANGED:
+            break
+        before = committed(fleet, row)
+        if place_m > stop_of_m(before) + LEAST_MOVE_M:
+            out = proposal.pieces[entry]
+            n = approach_without_stop(before, from_s, rules.road, rules.motion, out)
+            n = append_stop(out, n, place_m, rules.motion.comfort_mps2)
+            if n > 0 and (
+                k == 0 or _follows_safely(fleet, proposal, rows[k - 1], row, out[:n], from_s, rules)
+            ):
+                proposal.rows[entry] = row
+                proposal.piece_count[entry] = n
+                proposal.merge_time_s[entry] = math.inf
+                proposal.size[0] = entry + 1
+        after = trajectory_under(fleet, proposal, row)
+        place_m = min(place_m, stop_of_m(after) - fleet.length_m[row] - standing_m)
+    return proposal
+
+
+@kernel
+def undecided_in_lane_order(fleet: Fleet, time_s: float) -> IntArray:
+    """Returns the ramp rows whose merge is not committed, front first."""
+    rows = np.empty(len(fleet.live), np.int64)
+    stations_m = np.empty(len(fleet.live))
+    n = 0
+    for row in fleet.live:
+        if fleet.merge_time_s[row] == math.inf:
+            station_m, _ = station_and_speed(committed(fleet, row), time_s)
+            k = n
+            while k > 0 and stations_m[k - 1] < station_m:
+                stations_m[k], rows[k] = stations_m[k - 1], rows[k - 1]
+                k -= 1
+            stations_m[k], rows[k] = station_m, row
+            n += 1
+    return rows[:n]
+
+
+@kernel
+def _follows_safely(
+    fleet: Fleet,
+    proposal: Proposal,
+    leader: int,
+    row: int,
+    pieces: FloatArray,
+    from_s: float,
+    rules: Rules,
+) -> bool:
+    margin_m = pair_margin_m(
+        trajectory_under(fleet, proposal, leader),
+        fleet.length_m[leader],
+        math.inf,
+        pieces,
+        fleet.length_m[row],
+        math.inf,
+        from_s,
+        rules,
+    )
+    return margin_m >= rules.safety.execution_allowance_m - ROUNDING_M
+
+
+@kernel
+def safe_to_enter(
+    fleet: Fleet,
+    pieces: FloatArray,
+    length_m: float,
+    on_ramp: bool,
+    time_s: float,
+    rules: Rules,
+) -> bool:
+    """Returns whether the entry keeps its distance, the allowance included, from everyone ahead."""
+    if len(pieces) == 0:
+        return False
+    merge_s = math.inf if on_ramp else -math.inf
+    far_m = largest_safe_distance_m(rules)
+    highest_m = math.inf
+    if not on_ramp:
+        _, highest_m = intercept_range_m(pieces, time_s, rules.road.mainline_speed_mps)
+    for row in fleet.live:
+        if on_ramp and fleet.merge_time_s[row] <= time_s:
+            continue
+        if fleet.lowest_m[row] - fleet.length_m[row] - highest_m > far_m:
+            continue
+        margin_m = pair_margin_m(
+            pieces,
+            length_m,
+            merge_s,
+            committed(fleet, row),
+            fleet.length_m[row],
+            fleet.merge_time_s[row],
+            time_s,
+            rules,
+        )
+        if margin_m < rules.safety.execution_allowance_m - ROUNDING_M:
+            return False
+    return True
+
+
+@kernel
+def decision_due_s(pieces: FloatArray, decision_station_m: float) -> float:
+    """Returns when a ramp vehicle is to be planned: at its decision station, or where it must stop.
+
+    A vehicle whose stop behind others begins before the station is planned from there on.
+    """
+    return min(time_at_station(pieces, decision_station_m), stop_starts_s(pieces))

@@ -1,0 +1,99 @@
+"""From the ledger's history to what each vehicle drove: one sequence of pieces a vehicle."""
+
+import numpy as np
+
+from coramp._kernel import FloatArray, IntArray, kernel
+from coramp.coordination.ledger import Ledger
+from coramp.core.trajectory import (
+    ACCEL,
+    SPEED,
+    STATION,
+    TIME,
+    piece_end_s,
+    station_and_speed,
+    time_to_cover,
+)
+
+RAMP, ACCELERATION, MAINLINE = 0, 1, 2
+"""Codes of the lanes that pieces lie on."""
+
+
+def driven_pieces(
+    ledger: Ledger, vehicle_of_row: IntArray, vehicles: int, end_s: float
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Returns first rows (one a vehicle and one more), lane codes and pieces, up to ``end_s``.
+
+    Each commitment counts until the next one of its vehicle takes over, the last one until the
+    vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose and at the merge.
+    """
+    blocks = sorted(ledger.history, key=lambda block: int(vehicle_of_row[block.row]))
+    merge_s, until_s = np.full(vehicles, np.inf), np.full(vehicles, end_s)
+    for row, vehicle in enumerate(vehicle_of_row):
+        merge_s[vehicle] = ledger.merge_time_s(row)
+        until_s[vehicle] = min(end_s, ledger.exit_time_s(row))
+    return _stitched(
+        ledger.fleet.pieces,
+        np.array([vehicle_of_row[block.row] for block in blocks], np.int64),
+        np.array([block.first_piece for block in blocks], np.int64),
+        np.array([block.piece_count for block in blocks], np.int64),
+        merge_s,
+        until_s,
+    )
+
+
+@kernel
+def _stitched(
+    arena: FloatArray,
+    block_vehicle: IntArray,
+    block_first: IntArray,
+    block_count: IntArray,
+    merge_s: FloatArray,
+    until_s: FloatArray,
+) -> tuple[IntArray, IntArray, FloatArray]:
+    vehicles = len(until_s)
+    capacity = 3 * np.sum(block_count) + 8
+    first = np.zeros(vehicles + 1, np.int64)
+    lane = np.empty(capacity, np.int64)
+    rows = np.empty((capacity, 4))
+    n = 0
+    for b in range(len(block_vehicle)):
+        vehicle = block_vehicle[b]
+        pieces = arena[block_first[b] : block_first[b] + block_count[b]]
+        block_end_s = until_s[vehicle]
+        if b + 1 < len(block_vehicle) and block_vehicle[b + 1] == vehicle:
+            block_end_s = min(block_end_s, arena[block_first[b + 1], TIME])
+        for k in range(len(pieces)):
+            start_s = pieces[k, TIME]
+            end_s = min(piece_end_s(pieces, k), block_end_s)
+            while start_s < end_s:
+                n, start_s = _cut(pieces, k, start_s, end_s, merge_s[vehicle], lane, rows, n)
+        first[vehicle + 1] = n
+    for vehicle in range(vehicles):
+        first[vehicle + 1] = max(first[vehicle], first[vehicle + 1])
+    return first, lane[:n].copy(), rows[:n].copy()
+
+
+@kernel
+def _cut(
+    pieces: FloatArray,
+    k: int,
+    start_s: float,
+    end_s: float,
+    merge_s: float,
+    lane: IntArray,
+    rows: FloatArray,
+    n: int,
+) -> tuple[int, float]:
+    station_m, speed_mps = station_and_speed(pieces[: k + 1], start_s)
+    if start_s >= merge_s - 1e-9:
+        code = MAINLINE
+    elif station_m < -1e-9:
+        code = RAMP
+        end_s = min(end_s, start_s + time_to_cover(-station_m, speed_mps, pieces[k, ACCEL]))
+    else:
+        code = ACCELERATION
+        end_s = min(end_s, merge_s)
+    rows[n, TIME], rows[n, STATION] = start_s, station_m
+    rows[n, SPEED], rows[n, ACCEL] = speed_mps, pieces[k, ACCEL]
+    lane[n] = code
+    return n + 1, end_s

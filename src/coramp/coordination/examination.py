@@ -1,0 +1,92 @@
+"""Hands proposed commitments to the independent checker."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.audit.checker import Change, Vehicles, Verdict, examine
+from coramp.audit.distances import Bounds
+from coramp.coordination.ledger import Ledger
+from coramp.core.fleet import MAX_CHANGED
+from coramp.core.rules import Rules
+from coramp.core.trajectory import MAX_PIECES, station_and_speed
+from coramp.strategies.base import FollowTrajectory
+
+
+def bounds_of(rules: Rules) -> Bounds:
+    """Returns the rules in the words of the checker."""
+    road, safety, motion = rules.road, rules.safety, rules.motion
+    return Bounds(
+        zone_end_m=road.mainline_end_m,
+        stop_station_m=road.stop_station_m,
+        last_merge_station_m=road.last_merge_station_m,
+        mainline_speed_mps=road.mainline_speed_mps,
+        ramp_limit_mps=road.ramp_limit_mps,
+        cos_merge_angle=float(np.cos(road.merge_angle_rad)),
+        positioning_error_m=safety.positioning_error_m,
+        clock_error_s=safety.clock_error_s,
+        friction=safety.adhesion + safety.resistance,
+        time_gap_s=safety.time_gap_s,
+        allowance_m=safety.execution_allowance_m,
+        comfort_mps2=motion.comfort_mps2,
+        ramp_acceleration_mps2=motion.ramp_acceleration_mps2,
+        gap_speed_factor=1.0 + motion.speed_deviation,
+    )
+
+
+class Examiner:
+    """Holds the buffers in which changes are laid before the checker."""
+
+    def __init__(self, bounds: Bounds) -> None:
+        self._bounds = bounds
+        self._rows = np.zeros(MAX_CHANGED, np.int64)
+        self._count = np.zeros(MAX_CHANGED, np.int64)
+        self._pieces = np.zeros((MAX_CHANGED, MAX_PIECES, 4))
+        self._merge_s = np.zeros(MAX_CHANGED)
+        self._start = np.zeros((MAX_CHANGED, 3))
+        self._makes_gap = np.zeros(MAX_CHANGED, np.int64)
+
+    def entry(self, ledger: Ledger, row: int, pieces: FloatArray, state: FloatArray) -> Verdict:
+        """Returns the verdict on a vehicle that enters in ``state`` (time, station, speed)."""
+        self._lay(0, FollowTrajectory(row, pieces, ledger.merge_time_s(row)), state)
+        return self._examine(ledger, 1, float(state[0]))
+
+    def change(
+        self, ledger: Ledger, commands: Sequence[FollowTrajectory], earliest_s: float
+    ) -> Verdict:
+        """Returns the verdict on trajectories that take over from what is committed."""
+        for k, command in enumerate(commands):
+            start_s = command.pieces[0, 0]
+            station_m, speed_mps = station_and_speed(ledger.trajectory(command.row), start_s)
+            self._lay(k, command, np.array([start_s, station_m, speed_mps]))
+        return self._examine(ledger, len(commands), earliest_s)
+
+    def _lay(self, k: int, command: FollowTrajectory, start: FloatArray) -> None:
+        count = len(command.pieces)
+        self._rows[k] = command.row
+        self._count[k] = count
+        self._pieces[k, :count] = command.pieces
+        self._merge_s[k] = command.merge_time_s
+        self._start[k] = start
+        self._makes_gap[k] = command.makes_gap
+
+    def _examine(self, ledger: Ledger, k: int, earliest_s: float) -> Verdict:
+        fleet = ledger.fleet
+        vehicles = Vehicles(
+            fleet.pieces,
+            fleet.first_piece,
+            fleet.piece_count,
+            fleet.length_m,
+            fleet.merge_time_s,
+            fleet.live,
+        )
+        change = Change(
+            self._rows[:k],
+            self._count[:k],
+            self._pieces[:k],
+            self._merge_s[:k],
+            self._start[:k],
+            self._makes_gap[:k],
+        )
+        return examine(vehicles, change, earliest_s, self._bounds)

@@ -1,0 +1,1 @@
+"""Strategies: who yields to whom."""

@@ -1,0 +1,124 @@
+"""Ramp priority (section V.B of the paper): the mainline opens a gap where the ramp vehicle merges.
+
+The ramp vehicle keeps its free movement. X moves ahead, Y back or both, whichever adjusts the
+fewest vehicles and then the least. Where no bound allows that: a later free movement, or a stop.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from coramp._kernel import kernel
+from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal, proposed
+from coramp.core.rules import Rules
+from coramp.core.trajectory import cruise_intercept_m
+from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.ladder import decide_first, plan_of
+from coramp.strategies.rungs import (
+    Merge,
+    delay,
+    merge_at,
+    merge_freely,
+    no_merge,
+    unknown_bound_m,
+)
+from coramp.strategies.situation import (
+    RUNG_CREATE,
+    RUNG_DELAY,
+    RUNG_FREE,
+    RUNG_HOLD,
+    MergePlan,
+    Situation,
+    assess,
+    conflict_position,
+    gap_bounds_m,
+    gap_of_free_movement,
+)
+
+
+@kernel
+def scenario_of(fleet: Fleet, situation: Situation, gap: int) -> int:
+    """Returns 1 where X must move for free movement to fit into the gap, 2 for Y, 3 for both."""
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    if situation.free_m <= high_m:
+        return 2
+    return 1 if situation.free_m >= low_m else 3
+
+
+@kernel
+def open_gap(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> Merge:
+    """Rung create: opens the gap that free movement meets, or one of the two next to it.
+
+    The one that adjusts fewest vehicles, then the one with the smallest sum of shifts.
+    """
+    here = gap_of_free_movement(situation)
+    best = no_merge()
+    if situation.free_m < unknown_bound_m(fleet, situation):
+        return best
+    fewest, least_m = 0, math.inf
+    for gap in range(max(0, here - 1), min(len(situation.order), here + 1) + 1):
+        merge = merge_at(fleet, proposal, situation, gap, situation.free_m, True, rules)
+        if merge.gap < 0:
+            continue
+        moved, moved_m = proposal.size[0] - 1, total_shift_m(fleet, proposal, rules)
+        if best.gap < 0 or moved < fewest or (moved == fewest and moved_m < least_m):
+            best, fewest, least_m = merge, moved, moved_m
+    if best.gap >= 0:
+        return merge_at(fleet, proposal, situation, best.gap, situation.free_m, True, rules)
+    return best
+
+
+@kernel
+def total_shift_m(fleet: Fleet, proposal: Proposal, rules: Rules) -> float:
+    """Returns the sum of the shifts (m, each positive) of all vehicles but the subject."""
+    v0 = rules.road.mainline_speed_mps
+    total_m = 0.0
+    for entry in range(1, proposal.size[0]):
+        after_m = cruise_intercept_m(proposed(proposal, entry), v0)
+        before_m = cruise_intercept_m(committed(fleet, proposal.rows[entry]), v0)
+        total_m += abs(after_m - before_m)
+    return total_m
+
+
+@kernel
+def plan_with_ramp_priority(
+    fleet: Fleet,
+    subject: int,
+    now_s: float,
+    fastest_entry_mps: float,
+    rules: Rules,
+) -> tuple[MergePlan, Proposal]:
+    """Returns the plan of the first rung that helps, and the trajectories that it proposes."""
+    proposal = empty_proposal()
+    situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
+    merge = merge_freely(fleet, proposal, situation, rules)
+    if merge.gap >= 0:
+        return plan_of(fleet, proposal, situation, merge, RUNG_FREE, 0, -1, rules), proposal
+    conflict = conflict_position(fleet, situation, rules)
+    merge = open_gap(fleet, proposal, situation, rules)
+    if merge.gap >= 0:
+        scenario = scenario_of(fleet, situation, merge.gap)
+        return plan_of(
+            fleet, proposal, situation, merge, RUNG_CREATE, scenario, conflict, rules
+        ), proposal
+    for gap in range(len(situation.order) + 1):
+        merge = delay(fleet, proposal, situation, gap, rules)
+        if merge.gap >= 0:
+            return plan_of(
+                fleet, proposal, situation, merge, RUNG_DELAY, 0, conflict, rules
+            ), proposal
+    proposal.size[0] = 0
+    return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal
+
+
+@dataclass(frozen=True)
+class RampPriority:
+    """Ramp vehicles keep their free movement; mainline vehicles make room for them."""
+
+    name: ClassVar[str] = "ramp-priority"
+    summary: ClassVar[str] = "the paper's second method: the mainline opens a gap at the merge"
+    cooperative: ClassVar[bool] = True
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the answer for the first subject."""
+        return decide_first(plan_with_ramp_priority, view, memory)

@@ -1,0 +1,277 @@
+"""The rungs of the ladder: free, reach, create, delay; each fills a proposal or says that it can't.
+
+The functions return the chosen acceleration, merge time and merge station, and the gap's number,
+in a ``Merge``; ``gap`` is -1 where the rung does not help.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import kernel
+from coramp.core.approach import late_approach
+from coramp.core.fleet import (
+    ROUNDING_M,
+    Fleet,
+    Proposal,
+    committed,
+    entry_of,
+    pair_margin_m,
+    proposed,
+)
+from coramp.core.proposals import (
+    find_unsafe_pair,
+    propose_later_stop,
+    propose_merge,
+    push_ahead,
+    push_back,
+)
+from coramp.core.ramp_acceleration import acceleration_for_lag_mps2, lag_m
+from coramp.core.rules import Rules
+from coramp.core.trajectory import MAX_PIECES, station_and_speed
+from coramp.strategies.situation import (
+    Situation,
+    gap_bounds_m,
+    gap_of_free_movement,
+    situation_from,
+)
+
+
+class Merge(NamedTuple):
+    """Where a rung puts the subject."""
+
+    gap: int
+    accel_mps2: float
+    merge_time_s: float
+    merge_station_m: float
+    largest_shift_m: float
+
+
+@kernel
+def no_merge() -> Merge:
+    """Returns the answer of a rung that does not help."""
+    return Merge(-1, math.nan, math.nan, math.nan, math.nan)
+
+
+@kernel
+def merge_at(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    gap: int,
+    intercept_m: float,
+    make_room: bool,
+    rules: Rules,
+) -> Merge:
+    """Proposes that the subject ends at ``intercept_m`` in ``gap``; moves others aside if asked to.
+
+    The vehicle before the gap is pushed ahead and the one behind it back by what is missing, each
+    with its cascade. Nothing is moved where nothing is missing. The result's ``gap`` is -1 where a
+    bound or a safe distance would be broken.
+    """
+    v0 = rules.road.mainline_speed_mps
+    accel_mps2 = acceleration_for_lag_mps2(
+        v0, situation.nose_speed_mps, -v0 * situation.nose_s - intercept_m
+    )
+    accel_mps2 = min(accel_mps2, rules.motion.ramp_acceleration_mps2)
+    merge_s, merge_m = propose_merge(
+        proposal, situation.subject, situation.approach, accel_mps2, rules
+    )
+    if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
+        return no_merge()
+    ahead_m, back_m = 0.0, 0.0
+    if make_room:
+        low_m, high_m = gap_bounds_m(fleet, situation, gap)
+        ahead_m, back_m = max(0.0, intercept_m - high_m), max(0.0, low_m - intercept_m)
+        start_s = situation.nose_s if rules.control.create_from_nose else situation.from_s
+        if not push_ahead(
+            fleet,
+            proposal,
+            situation.order,
+            gap - 1,
+            situation.from_s,
+            start_s,
+            merge_s,
+            ahead_m,
+            rules,
+        ) or not push_back(
+            fleet,
+            proposal,
+            situation.order,
+            gap,
+            situation.from_s,
+            start_s,
+            merge_s,
+            back_m,
+            rules,
+        ):
+            return no_merge()
+    unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
+    if unsafe >= 0:
+        return no_merge()
+    return Merge(gap, accel_mps2, merge_s, merge_m, max(ahead_m, back_m))
+
+
+@kernel
+def merge_freely(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> Merge:
+    """Rung free: free movement, if it is safe as it is."""
+    if situation.free_m < unknown_bound_m(fleet, situation):
+        return no_merge()
+    gap = gap_of_free_movement(situation)
+    return merge_at(fleet, proposal, situation, gap, situation.free_m, False, rules)
+
+
+@kernel
+def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
+    """Rung reach: an acceleration of Eq. 22 that puts the subject into a gap that is large enough.
+
+    The one nearest to free movement's, or with ``gap_at_front`` that of Eq. 30. Where a vehicle
+    before it on the acceleration lane is in the way, others within the gap are tried.
+    """
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    front_m = high_m
+    low_m, high_m = max(low_m, situation.lowest_m), min(high_m, situation.highest_m)
+    if low_m > high_m:
+        return no_merge()
+    if rules.control.gap_at_front and not math.isinf(front_m):
+        if front_m > high_m + ROUNDING_M:
+            return no_merge()
+        return merge_at(fleet, proposal, situation, gap, front_m, False, rules)
+    nearest_m = min(max(situation.free_m, low_m), high_m)
+    for share in (0.0, 0.25, 0.5, 1.0):
+        merge = merge_at(
+            fleet,
+            proposal,
+            situation,
+            gap,
+            nearest_m + share * (low_m - nearest_m),
+            False,
+            rules,
+        )
+        if merge.gap >= 0 or nearest_m <= low_m + ROUNDING_M:
+            return merge
+    return no_merge()
+
+
+@kernel
+def create(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    gap: int,
+    scenario: int,
+    rules: Rules,
+) -> Merge:
+    """Rung create: a gap that is too small is made large enough.
+
+    Scenario 1: X moves ahead, Y stays (Eq. 36-45). 2: Y falls back, X stays. 3: both, in equal
+    parts, or as the subject's reach allows. The subject ends right before Y, right behind X, or in
+    between.
+    """
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    if low_m <= high_m:
+        return no_merge()
+    if scenario != 2 and gap == 0:
+        return no_merge()
+    if scenario != 1 and gap == len(situation.order):
+        return no_merge()
+    if scenario == 1:
+        intercept_m = max(low_m, situation.lowest_m)
+    elif scenario == 2:
+        intercept_m = min(high_m, situation.highest_m)
+    else:
+        intercept_m = min(max(0.5 * (low_m + high_m), situation.lowest_m), situation.highest_m)
+    if intercept_m < situation.lowest_m or intercept_m > situation.highest_m:
+        return no_merge()
+    if intercept_m < unknown_bound_m(fleet, situation):
+        return no_merge()
+    return merge_at(fleet, proposal, situation, gap, intercept_m, True, rules)
+
+
+@kernel
+def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
+    """Returns the lowest intercept (m) that bothers no vehicle which is yet to enter."""
+    return situation.known_m + float(fleet.length_m[situation.subject]) + situation.clearance_m
+
+
+@kernel
+def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
+    """Rung delay: slow down on the ramp at once so as to end at the front of a later gap.
+
+    The subject passes the nose late, at the ramp's speed, and accelerates as in free movement.
+    Vehicles behind it on the ramp brake where they would come too near.
+    """
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    target_m = min(high_m, situation.free_m)
+    if target_m < low_m:
+        return no_merge()
+    road, motion = rules.road, rules.motion
+    v0 = road.mainline_speed_mps
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    lag = lag_m(v0, road.ramp_speed_mps, motion.free_acceleration_mps2)
+    buffer = np.empty((MAX_PIECES, 4))
+    n = late_approach(
+        situation.from_s, station_m, speed_mps, -(target_m + lag) / v0, road, motion, buffer
+    )
+    if n == 0:
+        return no_merge()
+    later = situation_from(
+        situation.subject,
+        situation.from_s,
+        buffer[:n],
+        situation.known_m,
+        situation.order,
+        situation.intercepts_m,
+        rules,
+    )
+    accel_mps2 = later.free_accel_mps2
+    merge_s, merge_m = propose_merge(proposal, later.subject, later.approach, accel_mps2, rules)
+    if merge_m > road.last_merge_station_m + ROUNDING_M:
+        return no_merge()
+    if not delay_followers(fleet, proposal, situation, rules):
+        return no_merge()
+    unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
+    if unsafe >= 0:
+        return no_merge()
+    return Merge(gap, accel_mps2, merge_s, merge_m, 0.0)
+
+
+@kernel
+def delay_followers(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> bool:
+    """Adds those behind the subject on the ramp that would come too near to who is before them."""
+    leader = situation.subject
+    while True:
+        follower = next_on_ramp(fleet, leader, situation.from_s)
+        if follower < 0:
+            return True
+        entry = entry_of(proposal, leader)
+        margin_m = pair_margin_m(
+            proposed(proposal, entry),
+            fleet.length_m[leader],
+            proposal.merge_time_s[entry],
+            committed(fleet, follower),
+            fleet.length_m[follower],
+            math.inf,
+            situation.from_s,
+            rules,
+        )
+        if margin_m >= rules.safety.execution_allowance_m - ROUNDING_M:
+            return True
+        if not propose_later_stop(fleet, proposal, follower, leader, situation.from_s, rules):
+            return False
+        leader = follower
+
+
+@kernel
+def next_on_ramp(fleet: Fleet, leader: int, from_s: float) -> int:
+    """Returns the next ramp vehicle behind ``leader`` without a committed merge, or -1."""
+    leader_m, _ = station_and_speed(committed(fleet, leader), from_s)
+    found = -1
+    found_m = -math.inf
+    for row in fleet.live:
+        if row != leader and fleet.merge_time_s[row] == math.inf:
+            row_m, _ = station_and_speed(committed(fleet, row), from_s)
+            if found_m < row_m < leader_m:
+                found, found_m = row, row_m
+    return found
