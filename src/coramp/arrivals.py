@@ -1,0 +1,93 @@
+"""Who arrives when: random headways and entry speeds, the same for every strategy."""
+
+import zlib
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.coordination.plant import Arrival
+from coramp.scenario import Mainline, Ramp, Scenario
+
+
+def generator(seed: int, purpose: str) -> np.random.Generator:
+    """Returns the random generator of one purpose; another purpose never shifts it."""
+    return np.random.default_rng(
+        np.random.SeedSequence(seed, spawn_key=(zlib.crc32(purpose.encode()),))
+    )
+
+
+def arrival_times_s(
+    flow_veh_h: float,
+    min_headway_s: float,
+    horizon_s: float,
+    step_s: float,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Returns times (s) on the step grid within [0, horizon), headways shifted exponential.
+
+    A headway is ``min_headway`` plus an exponential one whose mean makes up the flow. Times are
+    rounded up to the grid, so headways keep their minimum if that is a multiple of the step.
+    """
+    if flow_veh_h == 0.0:
+        return np.empty(0)
+    mean_extra_s = 3600.0 / flow_veh_h - min_headway_s
+    expected = int(flow_veh_h * horizon_s / 3600.0)
+    times_s = np.empty(0)
+    last_s = 0.0
+    while last_s < horizon_s:
+        headways_s = min_headway_s + random.exponential(mean_extra_s, expected // 4 + 64)
+        times_s = np.concatenate([times_s, last_s + np.cumsum(headways_s)])
+        last_s = times_s[-1]
+    steps = np.ceil(times_s / step_s - 1e-9)
+    return np.asarray(steps[steps * step_s < horizon_s - 1e-9] * step_s)
+
+
+def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
+    """Returns all arrivals of a run, by time, the mainline's first where two coincide.
+
+    Vehicles are named by scheduled time: m00001, r00001 and so on.
+    """
+    step_s = scenario.control.step_s
+    if scenario.arrivals:
+        given = [
+            Arrival(
+                "",
+                arrival.stream == "ramp",
+                round(arrival.time_s / step_s),
+                arrival.speed_mps,
+                arrival.length_m or scenario.vehicle.length_m,
+            )
+            for arrival in scenario.arrivals
+        ]
+    else:
+        given = [
+            *_stream_arrivals(scenario, "mainline", scenario.mainline, seed),
+            *_stream_arrivals(scenario, "ramp", scenario.ramp, seed),
+        ]
+    named, numbers = [], [0, 0]
+    for arrival in sorted(given, key=lambda a: (a.step, a.on_ramp)):
+        numbers[arrival.on_ramp] += 1
+        name = f"{'r' if arrival.on_ramp else 'm'}{numbers[arrival.on_ramp]:05d}"
+        named.append(
+            Arrival(name, arrival.on_ramp, arrival.step, arrival.speed_mps, arrival.length_m)
+        )
+    return named
+
+
+def _stream_arrivals(
+    scenario: Scenario, name: str, stream: Mainline | Ramp, seed: int
+) -> list[Arrival]:
+    step_s = scenario.control.step_s
+    times_s = arrival_times_s(
+        stream.flow_veh_h,
+        stream.min_headway_s,
+        scenario.simulation.horizon_s,
+        step_s,
+        generator(seed, f"arrivals/{name}"),
+    )
+    low_mps, high_mps = stream.entry_speed_mps
+    speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
+    return [
+        Arrival("", name == "ramp", round(time_s / step_s), float(speed), scenario.vehicle.length_m)
+        for time_s, speed in zip(times_s, speeds_mps, strict=True)
+    ]

@@ -1,0 +1,146 @@
+"""Cooperative vehicles in SUMO: each follows its committed pieces.
+
+Python is entered at events only: the start of a piece, a lane change, the last step before the
+zone's end. At each the vehicle's position is compared with its plan.
+"""
+
+import heapq
+import math
+from dataclasses import dataclass, field
+from itertools import count
+
+from coramp._kernel import FloatArray
+from coramp.coordination.plant import Arrival
+from coramp.core.rules import Rules
+from coramp.core.trajectory import station_and_speed, time_at_station
+from coramp.engines.sumo.commands import ON_GRID, command_table
+from coramp.engines.sumo.demand import cooperative_type
+from coramp.engines.sumo.session import Session
+
+SPEED, MERGE, MEASURE = 0, 1, 2
+BEFORE_EXIT_S = 0.01
+"""A vehicle this close to the zone's end is left alone: SUMO may have taken it off the road."""
+
+
+@dataclass(slots=True)
+class Following:
+    """One commitment under way: its commands, and until which step it holds."""
+
+    row: int
+    pieces: FloatArray
+    commands: list[list[float]]
+    until: float = math.inf
+    next_command: int = 0
+
+
+@dataclass(slots=True)
+class Driven:
+    """A vehicle in SUMO."""
+
+    vehicle_id: str
+    entry_step: int
+    taken_over: bool = False
+    largest_error_m: float = 0.0
+    following: Following | None = field(default=None)
+
+
+class CooperativePlant:
+    """Carries cooperative vehicles through a SUMO session."""
+
+    def __init__(self, session: Session, lane_starts_m: dict[str, float], rules: Rules) -> None:
+        self.vehicles: list[Driven] = []
+        self._session = session
+        self._lane_starts_m = lane_starts_m
+        self._step_s = rules.control.step_s
+        self._exit_m = rules.road.mainline_end_m
+        self._events: list[tuple[int, int, int, Following]] = []
+        self._number = count()
+
+    def advance(self, step: int) -> None:
+        """Executes what is due before ``step``; SUMO itself may lag behind until then."""
+        events = self._events
+        while events and events[0][0] < step:
+            now, kind, _, following = heapq.heappop(events)
+            if now < following.until:
+                self._session.step_to(now + 1)
+                self._execute(kind, now, following)
+
+    def finish(self, step: int) -> None:
+        """Executes what is due up to ``step`` and lets SUMO reach it."""
+        self.advance(step + 1)
+        self._session.step_to(step + 1)
+
+    def enter(self, row: int, arrival: Arrival, step: int) -> None:
+        """Lets a vehicle enter at ``step``."""
+        if row != len(self.vehicles):
+            raise ValueError("rows must enter in order")
+        self.vehicles.append(Driven(arrival.vehicle_id, step))
+        self._session.add(
+            arrival.vehicle_id,
+            "ramp" if arrival.on_ramp else "mainline",
+            cooperative_type(arrival.length_m),
+            step,
+            arrival.speed_mps,
+        )
+
+    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+        """Makes a vehicle follow the pieces from their first time on."""
+        vehicle = self.vehicles[row]
+        exit_s = time_at_station(pieces, self._exit_m)
+        last = math.inf
+        if exit_s < math.inf:
+            last = math.floor((exit_s - BEFORE_EXIT_S) / self._step_s)
+        table = command_table(pieces, self._step_s).tolist()
+        commands = [command for command in table if command[0] <= last]
+        first = int(table[0][0])
+        if vehicle.following is not None:
+            vehicle.following.until = first
+        following = vehicle.following = Following(row, pieces, commands)
+        if commands:
+            self._push(first, SPEED, following)
+        if math.isfinite(merge_time_s):
+            change = math.ceil(merge_time_s / self._step_s - ON_GRID) - 1
+            if change >= first:
+                self._push(change, MERGE, following)
+                self._push(change + 1, MEASURE, following)
+        if first <= last < math.inf:
+            self._push(int(last), MEASURE, following)
+
+    def _push(self, step: int, kind: int, following: Following) -> None:
+        heapq.heappush(self._events, (step, kind, next(self._number), following))
+
+    def _execute(self, kind: int, step: int, following: Following) -> None:
+        vehicle = self.vehicles[following.row]
+        if kind == SPEED:
+            self._command_speed(vehicle, following)
+        elif kind == MERGE:
+            self._merge(step, vehicle, following)
+        else:
+            planned_m, _ = station_and_speed(following.pieces, step * self._step_s)
+            self._measure(vehicle, planned_m)
+
+    def _command_speed(self, vehicle: Driven, following: Following) -> None:
+        _, speed_mps, steps, station_m = following.commands[following.next_command]
+        if not vehicle.taken_over:
+            self._session.take_over(vehicle.vehicle_id)
+            vehicle.taken_over = True
+        self._measure(vehicle, station_m)
+        if steps == 0:
+            self._session.keep_speed(vehicle.vehicle_id, speed_mps)
+        else:
+            self._session.change_speed(vehicle.vehicle_id, speed_mps, int(steps))
+        following.next_command += 1
+        if following.next_command < len(following.commands):
+            self._push(int(following.commands[following.next_command][0]), SPEED, following)
+
+    def _merge(self, step: int, vehicle: Driven, following: Following) -> None:
+        lane, _ = self._session.lane_and_position_m(vehicle.vehicle_id)
+        if lane == "merge_0":
+            self._session.change_lane(vehicle.vehicle_id, 1)
+        else:  # the first step's travel behind the nose: the lane begins only now
+            self._push(step + 1, MERGE, following)
+
+    def _measure(self, vehicle: Driven, planned_m: float) -> None:
+        lane, position_m = self._session.lane_and_position_m(vehicle.vehicle_id)
+        error_m = abs(self._lane_starts_m[lane] + position_m - planned_m)
+        vehicle.largest_error_m = max(vehicle.largest_error_m, error_m)

@@ -1,0 +1,115 @@
+"""One SUMO simulation in this process; the only module that imports libsumo.
+
+Time: after ``step_to(n)`` SUMO has executed the steps 0 to n - 1, and vehicles stand where they
+are at step n - 1. What is commanded then governs the way from there to step n.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any, Self
+
+import libsumo as untyped_libsumo
+
+from coramp.engines.sumo.network import sumo_binary
+from coramp.errors import CorampError
+
+libsumo: Any = untyped_libsumo
+
+OBEY = 32
+"""Speed mode without any check: the vehicle does what it is told."""
+NO_CHANGES = 0
+"""Lane change mode without changes of its own, and without checks of those commanded."""
+FASTEST_COMMAND_MPS = 100.0
+
+
+class Session:
+    """A running simulation; use it as a context manager."""
+
+    _running = False
+
+    def __init__(self, options: Sequence[str], step_s: float, gui: bool = False) -> None:
+        if Session._running:
+            raise CorampError("SUMO: one simulation a process; the other one still runs")
+        if gui and not os.environ.get("DISPLAY"):
+            raise CorampError("--gui: there is no screen (DISPLAY is not set); run without --gui")
+        self._step_s = step_s
+        program = sumo_binary("sumo-gui" if gui else "sumo")
+        extra = ("--start", "--quit-on-end") if gui else ()
+        try:
+            libsumo.start([program, *options, "--step-length", repr(step_s), *extra])
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise CorampError(f"SUMO: {error}") from error
+        Session._running = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        Session._running = False
+        libsumo.close()
+
+    def step_to(self, step: int) -> None:
+        """Executes all steps before ``step``."""
+        libsumo.simulationStep(step * self._step_s)
+
+    def vehicles_left(self) -> int:
+        """Returns how many vehicles drive or are still to enter."""
+        return int(libsumo.simulation.getMinExpectedNumber())
+
+    def add(self, vehicle_id: str, route: str, kind: str, step: int, speed_mps: float) -> None:
+        """Lets a vehicle enter at ``step`` with its front at the start of its route."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.add(
+            vehicle_id,
+            route,
+            kind,
+            depart=repr(round(step * self._step_s, 6)),
+            departPos="0",
+            departSpeed=repr(speed_mps),
+        )
+
+    def take_over(self, vehicle_id: str) -> None:
+        """Switches off the vehicle's own driver."""
+        libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
+
+    def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
+        """Commands a speed from now on."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
+
+    def change_speed(self, vehicle_id: str, speed_mps: float, steps: int) -> None:
+        """Commands an even change to a speed over a number of steps."""
+        _check_speed(vehicle_id, speed_mps)
+        if steps < 1:
+            raise CorampError(f"SUMO: {vehicle_id}: cannot change speed over {steps} steps")
+        libsumo.vehicle.slowDown(vehicle_id, speed_mps, steps * self._step_s)
+
+    def change_lane(self, vehicle_id: str, lane: int) -> None:
+        """Commands a lane change at the end of the next step."""
+        libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
+
+    def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
+        """Returns the lane that the vehicle's front is on, and its position along it (m).
+
+        Raises CorampError if the vehicle is not on the road.
+        """
+        try:
+            return (
+                libsumo.vehicle.getLaneID(vehicle_id),
+                libsumo.vehicle.getLanePosition(vehicle_id),
+            )
+        except libsumo.TraCIException as error:
+            raise CorampError(f"SUMO: {vehicle_id} is not on the road: {error}") from error
+
+
+def _check_speed(vehicle_id: str, speed_mps: float) -> None:
+    if not (math.isfinite(speed_mps) and 0.0 <= speed_mps <= FASTEST_COMMAND_MPS):
+        raise CorampError(f"SUMO: {vehicle_id}: a speed of {speed_mps} m/s is not to be commanded")

@@ -1,0 +1,41 @@
+"""From a name or a file, with overrides, to a validated scenario."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from coramp.errors import CorampError
+from coramp.scenario import Scenario
+from coramp.toml_files import builtin_names, read, validated, with_overrides
+
+OPTIONS = {
+    "mainline.flow_veh_h": "--mainline",
+    "ramp.flow_veh_h": "--ramp",
+    "simulation.horizon_s": "--horizon",
+}
+"""Options of the command line that stand for keys of a scenario."""
+
+
+def load_scenario(name: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Returns the built-in scenario of that name, or that of a file, with dotted keys overridden.
+
+    Raises CorampError with a message for each thing that is wrong.
+    """
+    label, data = read("scenarios", name)
+    overrides = overrides or {}
+    origins = {key: OPTIONS.get(key, "--set") for key in overrides}
+    return validated(Scenario, with_overrides(data, overrides), label, origins)
+
+
+def builtin_scenarios() -> list[Scenario]:
+    """Returns the scenarios that come with coramp."""
+    return [load_scenario(name) for name in builtin_names("scenarios")]
+
+
+def drivers_checked(scenario: Scenario, drivers: str) -> str:
+    """Returns the name of a driver population; raises CorampError if the scenario has none such."""
+    if drivers not in scenario.drivers:
+        known = ", ".join(scenario.drivers) or "none: the scenario has no [drivers.NAME] table"
+        raise CorampError(
+            f"drivers: there is no {drivers!r} in {scenario.name}; allowed are {known}"
+        )
+    return drivers

@@ -1,0 +1,1 @@
+"""What a run amounts to, computed from its records alone."""

@@ -1,0 +1,253 @@
+"""How near vehicles came: exact extremes over all pairs of neighbours in a lane, from pieces.
+
+Neighbours change only when a vehicle enters a lane, leaves it or leaves the zone. Between two such
+moments each pair of pieces gives its smallest margin, time to collision and largest deceleration
+rate to avoid a collision in closed form. Vehicles that are no neighbours are further apart than
+neighbours are, as long as nobody overlaps.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp.core.conflict_risk import conflict_severity_m2ps4
+from coramp.core.rules import SafetyBudget
+from coramp.core.safe_distance import merge_distance_m, merging_speed_along_mps
+from coramp.core.separation import smallest_margin_m
+from coramp.core.trajectory import (
+    ACCEL,
+    SPEED,
+    STATION,
+    TIME,
+    piece_at,
+    piece_end_s,
+    station_and_speed,
+)
+
+LEAVE, ENTER = 0, 1
+"""Kinds of events; at one time vehicles leave before others enter."""
+MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS = range(5)
+
+
+class LaneUse(NamedTuple):
+    """Who uses a lane when. Vehicle i drives ``rows[first[i] : first[i + 1]]``.
+
+    It is in the lane from ``from_s[i]`` (nan: never) to ``until_s[i]``, and came by a lane change
+    if ``merges[i]``. ``error_m`` is its largest distance from plan.
+    """
+
+    first: IntArray
+    rows: FloatArray
+    length_m: FloatArray
+    error_m: FloatArray
+    from_s: FloatArray
+    until_s: FloatArray
+    merges: BoolArray
+
+
+@kernel
+def lane_extremes(lane: LaneUse, merge_angle_rad: float, safety: SafetyBudget) -> FloatArray:
+    """Returns min margin (m), min TTC (s), max DRAC (m/s2), max severity (m2/s4), violations.
+
+    Margins are over Eq. 1, for vehicles that merge over Eq. 15 and 16 at that moment, less the
+    plan errors of both. A violation is a pair of neighbours with a negative margin.
+    """
+    extremes = np.array([math.inf, math.inf, 0.0, 0.0, 0.0])
+    times_s, kinds, vehicles = lane_events(lane)
+    order = np.empty(len(lane.from_s), np.int64)
+    since_s = np.empty(len(lane.from_s))
+    count = 0
+    for e in range(len(times_s)):
+        now_s, vehicle = times_s[e], vehicles[e]
+        place = _place_of(lane, order, count, vehicle, kinds[e], now_s)
+        if kinds[e] == LEAVE:
+            if place > 0:
+                _end_pair(
+                    extremes, lane, order[place - 1], vehicle, since_s[vehicle], now_s, safety
+                )
+            if place + 1 < count:
+                rear = order[place + 1]
+                _end_pair(extremes, lane, vehicle, rear, since_s[rear], now_s, safety)
+                since_s[rear] = now_s
+            order[place : count - 1] = order[place + 1 : count].copy()
+            count -= 1
+            continue
+        if place < count:
+            rear = order[place]
+            if place > 0:
+                _end_pair(extremes, lane, order[place - 1], rear, since_s[rear], now_s, safety)
+            since_s[rear] = now_s
+        if lane.merges[vehicle]:
+            for k in (place - 1, place):
+                if 0 <= k < count:
+                    _look_at_merge(
+                        extremes, lane, vehicle, order[k], now_s, merge_angle_rad, safety
+                    )
+        order[place + 1 : count + 1] = order[place:count].copy()
+        order[place] = vehicle
+        since_s[vehicle] = now_s
+        count += 1
+    return extremes
+
+
+@kernel
+def lane_events(lane: LaneUse) -> tuple[FloatArray, IntArray, IntArray]:
+    """Returns times (s), kinds and vehicles of all comings and goings in a lane, in their order."""
+    n = len(lane.from_s)
+    times_s, kinds = np.empty(2 * n), np.empty(2 * n, np.int64)
+    vehicles = np.empty(2 * n, np.int64)
+    count = 0
+    for i in range(n):
+        if lane.from_s[i] < lane.until_s[i]:
+            times_s[count], kinds[count], vehicles[count] = lane.until_s[i], LEAVE, i
+            times_s[count + 1], kinds[count + 1], vehicles[count + 1] = lane.from_s[i], ENTER, i
+            count += 2
+    by_kind = np.argsort(kinds[:count], kind="mergesort")
+    by_time = np.argsort(times_s[:count][by_kind], kind="mergesort")
+    order = by_kind[by_time]
+    return times_s[:count][order], kinds[:count][order], vehicles[:count][order]
+
+
+@kernel
+def driven(lane: LaneUse, vehicle: int) -> FloatArray:
+    """Returns the pieces that a vehicle drove."""
+    return lane.rows[lane.first[vehicle] : lane.first[vehicle + 1]]
+
+
+@kernel
+def _place_of(
+    lane: LaneUse, order: IntArray, count: int, vehicle: int, kind: int, now_s: float
+) -> int:
+    place = 0
+    if kind == LEAVE:
+        while order[place] != vehicle:
+            place += 1
+        return place
+    own_m, _ = station_and_speed(driven(lane, vehicle), now_s)
+    while place < count:
+        other_m, _ = station_and_speed(driven(lane, order[place]), now_s)
+        if other_m < own_m:
+            break
+        place += 1
+    return place
+
+
+@kernel
+def _end_pair(
+    extremes: FloatArray,
+    lane: LaneUse,
+    front: int,
+    rear: int,
+    start_s: float,
+    end_s: float,
+    safety: SafetyBudget,
+) -> None:
+    ahead, behind = driven(lane, front), driven(lane, rear)
+    margin_m, _ = smallest_margin_m(ahead, lane.length_m[front], behind, start_s, end_s, safety)
+    _note_margin(extremes, margin_m - lane.error_m[front] - lane.error_m[rear])
+    ttc_s, drac_mps2 = closing_extremes(ahead, lane.length_m[front], behind, start_s, end_s)
+    extremes[TTC] = min(extremes[TTC], ttc_s)
+    extremes[DRAC] = max(extremes[DRAC], drac_mps2)
+
+
+@kernel
+def _note_margin(extremes: FloatArray, margin_m: float) -> None:
+    extremes[MARGIN] = min(extremes[MARGIN], margin_m)
+    if margin_m < 0.0:
+        extremes[VIOLATIONS] += 1.0
+
+
+@kernel
+def _look_at_merge(
+    extremes: FloatArray,
+    lane: LaneUse,
+    merging: int,
+    other: int,
+    now_s: float,
+    merge_angle_rad: float,
+    safety: SafetyBudget,
+) -> None:
+    own_m, own_mps = station_and_speed(driven(lane, merging), now_s)
+    other_m, other_mps = station_and_speed(driven(lane, other), now_s)
+    if other_m >= own_m:
+        distance_m = other_m - lane.length_m[other] - own_m
+    else:
+        distance_m = own_m - lane.length_m[merging] - other_m
+    along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
+    margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
+    if margin_m - lane.error_m[merging] - lane.error_m[other] < 0.0:
+        extremes[VIOLATIONS] += 1.0
+    severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
+    extremes[SEVERITY] = max(extremes[SEVERITY], severity)
+
+
+@kernel
+def closing_extremes(
+    front: FloatArray, front_length_m: float, rear: FloatArray, start_s: float, end_s: float
+) -> tuple[float, float]:
+    """Returns the smallest TTC (s) and the largest DRAC (m/s2) of a pair within a span, exactly.
+
+    TTC = gap / closing speed, DRAC = closing speed^2 / (2 gap) while the rear vehicle is faster;
+    infinity and 0 if it never is.
+    """
+    ttc_s, drac_mps2 = math.inf, 0.0
+    i, j = piece_at(front, start_s), piece_at(rear, start_s)
+    now_s = start_s
+    while now_s < end_s:
+        next_s = min(end_s, piece_end_s(front, i), piece_end_s(rear, j))
+        front_m, front_mps = _state_in(front, i, now_s)
+        rear_m, rear_mps = _state_in(rear, j, now_s)
+        gap_m = front_m - front_length_m - rear_m
+        opening_mps = front_mps - rear_mps
+        opening_mps2 = front[i, ACCEL] - rear[j, ACCEL]
+        for x in _candidates(gap_m, opening_mps, opening_mps2, next_s - now_s):
+            closing_mps = -(opening_mps + opening_mps2 * x)
+            gap_then_m = gap_m + (opening_mps + 0.5 * opening_mps2 * x) * x
+            if closing_mps > 0.0 and gap_then_m > 0.0:
+                ttc_s = min(ttc_s, gap_then_m / closing_mps)
+                drac_mps2 = max(drac_mps2, 0.5 * closing_mps * closing_mps / gap_then_m)
+        now_s = next_s
+        if piece_end_s(front, i) <= now_s:
+            i += 1
+        if piece_end_s(rear, j) <= now_s:
+            j += 1
+    return ttc_s, drac_mps2
+
+
+@kernel
+def _state_in(pieces: FloatArray, k: int, time_s: float) -> tuple[float, float]:
+    x = time_s - pieces[k, TIME]
+    return (
+        pieces[k, STATION] + (pieces[k, SPEED] + 0.5 * pieces[k, ACCEL] * x) * x,
+        pieces[k, SPEED] + pieces[k, ACCEL] * x,
+    )
+
+
+@kernel
+def _candidates(
+    gap_m: float, opening_mps: float, opening_mps2: float, duration_s: float
+) -> FloatArray:
+    """Where TTC and DRAC can be extreme: the ends, and where their derivatives vanish.
+
+    With gap g, closing speed c and c' = -opening_mps2, d(g/c) = 0 where c^2 = -g c', and
+    d(c^2/g) = 0 where c^2 = -2 g c'. Both are quadratic in x.
+    """
+    found = np.empty(6)
+    found[0], found[1] = 0.0, duration_s
+    n = 2
+    if opening_mps2 > 0.0:
+        for factor in (1.0, 2.0):
+            # (o + a x)^2 = factor a (g + o x + a x^2 / 2)
+            square = opening_mps2 * opening_mps2 * (1.0 - 0.5 * factor)
+            linear = opening_mps * opening_mps2 * (2.0 - factor)
+            constant = opening_mps * opening_mps - factor * opening_mps2 * gap_m
+            discriminant = linear * linear - 4.0 * square * constant
+            if square > 0.0 and discriminant >= 0.0:
+                root = math.sqrt(discriminant)
+                for x in ((-linear - root) / (2.0 * square), (-linear + root) / (2.0 * square)):
+                    if 0.0 < x < duration_s:
+                        found[n] = x
+                        n += 1
+    return found[:n]

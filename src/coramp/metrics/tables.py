@@ -1,0 +1,265 @@
+"""From an outcome to the tables that a run leaves behind and the figures that sum it up."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.coordination.coordinator import DecisionRecord
+from coramp.metrics.motion import BIN_S, binned_motion, fuel_of_each_l, hardest_braking_mps2
+from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, Schema
+from coramp.metrics.separations import (
+    DRAC,
+    MARGIN,
+    SEVERITY,
+    TTC,
+    VIOLATIONS,
+    LaneUse,
+    lane_extremes,
+)
+from coramp.records import LANES, STREAMS, Outcome
+from coramp.scenario import Scenario
+from coramp.strategies.situation import RUNGS
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class RunTables:
+    """The tables of a run; trajectories and decisions only where there were plans."""
+
+    vehicles: pl.DataFrame
+    speeds: pl.DataFrame
+    trajectories: pl.DataFrame | None
+    decisions: pl.DataFrame | None
+    metrics: Row
+    streams: list[Row]
+
+
+def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
+    """Returns all tables and figures of a run."""
+    vehicles, speeds = vehicles_table(outcome, scenario), speeds_table(outcome)
+    decisions = _decisions_of(outcome) if outcome.cooperative else None
+    streams = [stream_figures(vehicles, speeds, name) for name in STREAMS]
+    metrics = {
+        **_stream_metrics(streams),
+        **safety_figures(outcome, scenario),
+        **_decision_figures(outcome, decisions),
+    }
+    return RunTables(
+        vehicles,
+        speeds,
+        trajectories_table(outcome) if outcome.cooperative else None,
+        decisions,
+        metrics,
+        streams,
+    )
+
+
+def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
+    """Returns one row a vehicle.
+
+    Delay is from scheduled entry to exit, less free flow; for a vehicle that is not out when the
+    run is cut off it counts up to then.
+    """
+    passages, pieces = outcome.passages, outcome.pieces
+    finished = ~np.isnan(passages.exit_s)
+    entered = ~np.isnan(passages.entry_s)
+    until_s = np.where(finished, passages.exit_s, outcome.end_s)
+    entry_s = np.where(entered, passages.entry_s, outcome.end_s)
+    free_flow_s = np.where(
+        passages.on_ramp, scenario.ramp_free_flow_s, scenario.mainline_free_flow_s
+    )
+    way_m = np.where(passages.on_ramp, -scenario.ramp.start_m, -scenario.mainline.start_m)
+    travel_s = until_s - entry_s
+    mean_speed_mps = np.full(len(passages), np.nan)
+    np.divide(way_m + scenario.mainline.end_m, travel_s, out=mean_speed_mps, where=finished)
+    return _frame(
+        VEHICLES,
+        vehicle_id=passages.vehicle_id,
+        stream=_stream_names(passages.on_ramp),
+        scheduled_s=passages.scheduled_s,
+        entry_s=passages.entry_s,
+        exit_s=passages.exit_s,
+        waiting_s=entry_s - passages.scheduled_s,
+        travel_s=travel_s,
+        free_flow_s=free_flow_s,
+        delay_s=until_s - passages.scheduled_s - free_flow_s,
+        mean_speed_mps=mean_speed_mps,
+        fuel_l=fuel_of_each_l(pieces.first, pieces.rows, until_s),
+        finished=finished,
+        plan_error_m=passages.plan_error_m,
+    )
+
+
+def _stream_names(on_ramp: BoolArray) -> list[str]:
+    return [STREAMS[1] if ramp else STREAMS[0] for ramp in on_ramp]
+
+
+def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
+    frame = pl.DataFrame(
+        {name: columns[name] for name in schema}, schema=schema, nan_to_null=True, strict=False
+    )
+    return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
+
+
+def speeds_table(outcome: Outcome) -> pl.DataFrame:
+    """Returns the space-mean speed of each stream in bins of 1 s, where there are vehicles."""
+    passages, pieces = outcome.passages, outcome.pieces
+    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
+    bins = math.ceil(outcome.end_s / BIN_S) + 1
+    distance_m, time_s, vehicles = binned_motion(
+        pieces.first, pieces.rows, until_s, passages.on_ramp, bins
+    )
+    frames = []
+    for stream, name in enumerate(STREAMS):
+        used = np.flatnonzero(time_s[stream] > 0.0)
+        frames.append(
+            _frame(
+                SPEEDS,
+                stream=[name] * len(used),
+                time_s=used * BIN_S,
+                mean_speed_mps=distance_m[stream, used] / time_s[stream, used],
+                vehicles=vehicles[stream, used],
+            )
+        )
+    return pl.concat(frames)
+
+
+def trajectories_table(outcome: Outcome) -> pl.DataFrame:
+    """Returns one row a driven piece."""
+    pieces, names = outcome.pieces, outcome.passages.vehicle_id
+    counts = np.diff(pieces.first)
+    return _frame(
+        TRAJECTORIES,
+        vehicle_id=[name for name, n in zip(names, counts, strict=True) for _ in range(n)],
+        lane=[LANES[code] for code in pieces.lane],
+        time_s=pieces.rows[:, 0],
+        station_m=pieces.rows[:, 1],
+        speed_mps=pieces.rows[:, 2],
+        accel_mps2=pieces.rows[:, 3],
+    )
+
+
+def _decisions_of(outcome: Outcome) -> pl.DataFrame:
+    return decisions_table(outcome.decisions, outcome.passages.vehicle_id, outcome.vehicle_of_row)
+
+
+NAMED_ROWS = {
+    "vehicle_id": "row",
+    "conflict_vehicle_id": "conflict_row",
+    "front_vehicle_id": "front_row",
+    "rear_vehicle_id": "rear_row",
+}
+
+
+def decisions_table(
+    decisions: Sequence[DecisionRecord], vehicle_ids: Sequence[str], vehicle_of_row: IntArray
+) -> pl.DataFrame:
+    """Returns one row a decision; what a decision has not is null."""
+
+    def name(row: int) -> str | None:
+        return vehicle_ids[vehicle_of_row[row]] if row >= 0 else None
+
+    rows = []
+    for decision in decisions:
+        why = decision.explanation
+        row: Row = {key: getattr(why, key, None) for key in DECISIONS}
+        row.update({key: name(getattr(why, field)) for key, field in NAMED_ROWS.items()})
+        row["time_s"] = decision.time_s
+        row["scenario"] = why.scenario or None
+        row["adjusted_vehicle_ids"] = [name(adjusted) for adjusted in decision.adjusted_rows]
+        row["min_margin_m"] = decision.min_margin_m
+        rows.append(row)
+    frame = pl.DataFrame(rows, schema=DECISIONS, orient="row")
+    return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
+
+
+def stream_figures(vehicles: pl.DataFrame, speeds: pl.DataFrame, stream: str) -> Row:
+    """Returns the figures of one stream; null where it has no vehicles."""
+    of_stream = vehicles.filter(stream=stream)
+    bins = speeds.filter(stream=stream)["mean_speed_mps"]
+    speed = of_stream["mean_speed_mps"].drop_nulls()
+    return {
+        "stream": stream,
+        "vehicles": of_stream.height,
+        "unserved": of_stream.height - int(of_stream["finished"].sum()),
+        "delay_s": of_stream["delay_s"].mean(),
+        "delay_p95_s": of_stream["delay_s"].quantile(0.95, "linear"),
+        "waiting_s": of_stream["waiting_s"].mean(),
+        "speed_mps": speed.mean(),
+        "speed_std_mps": bins.std(ddof=0) if bins.len() else None,
+        "fuel_l": of_stream["fuel_l"].sum(),
+    }
+
+
+def _stream_metrics(streams: list[Row]) -> Row:
+    result: Row = {"unserved": sum(s["unserved"] for s in streams)}
+    for figures in streams:
+        name = figures["stream"]
+        result[f"vehicles_{name}"] = figures["vehicles"]
+        for key in ("delay_s", "delay_p95_s", "speed_mps", "speed_std_mps"):
+            result[f"{name}_{key}"] = figures[key]
+    result["fuel_l"] = sum(s["fuel_l"] for s in streams)
+    return result
+
+
+def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
+    """Returns how near vehicles came and how hard they braked; null where no two met."""
+    passages, pieces = outcome.passages, outcome.pieces
+    rules = scenario.rules()
+    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
+    until_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
+    error_m = np.nan_to_num(passages.plan_error_m)
+    on_mainline_s = np.where(passages.on_ramp, passages.merge_s, passages.entry_s)
+    off_ramp_s = np.where(np.isnan(passages.merge_s), until_s, passages.merge_s)
+    on_ramp_s = np.where(passages.on_ramp, passages.entry_s, np.nan)
+    extremes = []
+    for from_s, to_s in ((on_mainline_s, until_s), (on_ramp_s, off_ramp_s)):
+        lane = LaneUse(
+            pieces.first,
+            pieces.rows,
+            passages.length_m,
+            error_m,
+            from_s,
+            to_s,
+            passages.on_ramp & (from_s is on_mainline_s),
+        )
+        extremes.append(lane_extremes(lane, rules.road.merge_angle_rad, rules.safety))
+    mainline, ramp = extremes
+    return {
+        "collisions": outcome.collisions,
+        "safety_violations": int(mainline[VIOLATIONS] + ramp[VIOLATIONS]),
+        "min_margin_m": _finite(min(mainline[MARGIN], ramp[MARGIN])),
+        "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
+        "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
+        "max_severity": float(mainline[SEVERITY]),
+        "max_decel_mps2": float(hardest_braking_mps2(pieces.rows)),
+        "plan_error_m": _largest(passages.plan_error_m),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _largest(values: FloatArray) -> float | None:
+    known = values[~np.isnan(values)]
+    return float(known.max()) if len(known) else None
+
+
+def _decision_figures(outcome: Outcome, decisions: pl.DataFrame | None) -> Row:
+    """How many ramp vehicles each rung served (hold: how many waited), how many others moved."""
+    if decisions is None:
+        rungs = {f"rung_{rung}": None for rung in RUNGS}
+        return {"adjusted_vehicles": None, **rungs, "refused_plans": None}
+    adjusted = {row for decision in outcome.decisions for row in decision.adjusted_rows}
+    return {
+        "adjusted_vehicles": len(adjusted),
+        **{f"rung_{rung}": decisions.filter(rung=rung)["vehicle_id"].n_unique() for rung in RUNGS},
+        "refused_plans": len(outcome.refusals),
+    }

@@ -1,0 +1,354 @@
+"""Scenarios: a road, its vehicles, its traffic and its controller, as validated TOML.
+
+All numbers are SI. Unknown keys, wrong types, nan and infinity are refused, and so is what cannot
+work together. ``--set key=value`` takes the same dotted keys.
+"""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from coramp.core.conflict_risk import GRAVITY_MPS2
+from coramp.core.gaps import least_acceleration_mps2
+from coramp.core.ramp_acceleration import lag_m
+from coramp.core.rules import Control, MotionLimits, Road, Rules, SafetyBudget
+from coramp.core.safe_distance import merge_clearance_m
+
+FASTEST_MPS = 60.0
+
+
+class Model(BaseModel):
+    """Frozen, strict, and without room for keys that nobody reads."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+Speed = Annotated[float, Field(gt=0.0, le=FASTEST_MPS)]
+SpeedRange = Annotated[tuple[Speed, Speed], Field(strict=False)]
+Flow = Annotated[float, Field(ge=0.0)]
+Headway = Annotated[float, Field(gt=0.0, le=60.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Mainline(Model):
+    """The mainline lane of the control zone; station 0 is the end of the ramp."""
+
+    start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
+    end_m: Annotated[float, Field(gt=0.0, le=20000.0)]
+    speed_mps: Speed
+    limit_mps: Speed
+    entry_speed_mps: SpeedRange
+    flow_veh_h: Flow
+    min_headway_s: Headway
+
+
+class Ramp(Model):
+    """The ramp, which ends at station 0, and the acceleration lane behind it."""
+
+    start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
+    speed_mps: Speed
+    limit_mps: Speed
+    entry_speed_mps: SpeedRange
+    flow_veh_h: Flow
+    min_headway_s: Headway
+    acceleration_lane_m: Annotated[float, Field(gt=0.0, le=5000.0)]
+    merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
+    decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0
+    stop_station_m: Annotated[float, Field(lt=0.0)] = -1.0
+
+
+class Vehicle(Model):
+    """All vehicles are alike; an explicit arrival may be longer or shorter."""
+
+    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = 5.0
+
+
+class Safety(Model):
+    """The error budget of Eq. 1, and what planning adds to it."""
+
+    positioning_error_m: Annotated[float, Field(ge=0.0, le=20.0)] = 0.02
+    clock_error_s: Annotated[float, Field(ge=0.0, le=1.0)] = 3e-9
+    adhesion: Annotated[float, Field(gt=0.0, le=2.0)] = 0.4
+    resistance: Annotated[float, Field(ge=0.0, le=1.0)] = 0.11
+    time_gap_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    execution_allowance_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
+
+
+class Motion(Model):
+    """How hard vehicles accelerate and brake, and how far speed may leave v0 for a gap."""
+
+    speed_up_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 1.5
+    slow_down_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 2.0
+    comfort_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 0.3 * GRAVITY_MPS2
+    free_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 2.0
+    ramp_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 6.0
+    speed_deviation: Annotated[float, Field(ge=0.0, le=0.5)] = 0.1
+    slowest_ramp_speed_mps: Speed = 2.0
+
+
+class Controller(Model):
+    """The control clock and the readings of the paper that are open to choice."""
+
+    step_s: Annotated[float, Field(ge=0.01, le=1.0)] = 0.1
+    actuation_delay_s: Annotated[float, Field(ge=0.0, le=5.0)] = 0.1
+    retry_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.5
+    gap_position: Literal["nearest", "front"] = "nearest"
+    gap_creation_start: Literal["decision", "nose"] = "decision"
+
+
+class Drivers(Model):
+    """A population of ordinary drivers for uncontrolled runs, in SUMO's terms.
+
+    ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and
+    v0 from there on.
+    """
+
+    wish: Literal["entry-speed", "free-flow"]
+    sigma: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    tau_s: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    min_gap_m: Annotated[float, Field(ge=0.0, le=20.0)] = 2.5
+    lc_cooperative: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    integrator: Literal["euler", "ballistic"] = "euler"
+
+
+class ExplicitArrival(Model):
+    """One vehicle of a given list of arrivals; times lie on the step grid."""
+
+    stream: Literal["mainline", "ramp"]
+    time_s: NotNegative
+    speed_mps: Speed
+    length_m: Annotated[float, Field(gt=0.0, le=40.0)] | None = None
+
+
+class Simulation(Model):
+    """How long vehicles arrive, and how long a run may go on after that until it is empty."""
+
+    horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 1800.0
+    drain_s: Annotated[float, Field(gt=0.0, le=86400.0)] = 1800.0
+
+
+class Scenario(Model):
+    """Everything about a run but its strategy, drivers, flows' overrides and seed."""
+
+    name: Annotated[str, Field(min_length=1)]
+    description: str = ""
+    mainline: Mainline
+    ramp: Ramp
+    vehicle: Vehicle = Vehicle()
+    safety: Safety = Safety()
+    motion: Motion = Motion()
+    control: Controller = Controller()
+    drivers: dict[str, Drivers] = {}
+    simulation: Simulation = Simulation()
+    arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _works_together(self) -> Self:
+        problems = [*_speed_problems(self), *_place_problems(self), *_flow_problems(self)]
+        problems += _clock_problems(self)
+        if not problems:
+            problems += _planning_problems(self)
+        if problems:
+            raise ValueError("\n".join(problems))
+        return self
+
+    def rules(self) -> Rules:
+        """Returns what planners are bound by."""
+        return Rules(
+            Road(
+                mainline_start_m=self.mainline.start_m,
+                mainline_end_m=self.mainline.end_m,
+                ramp_start_m=self.ramp.start_m,
+                decision_station_m=self.ramp.decision_station_m,
+                stop_station_m=self.ramp.stop_station_m,
+                acceleration_lane_m=self.ramp.acceleration_lane_m,
+                last_merge_station_m=self.last_merge_station_m,
+                mainline_speed_mps=self.mainline.speed_mps,
+                ramp_speed_mps=self.ramp.speed_mps,
+                ramp_limit_mps=self.ramp.limit_mps,
+                merge_angle_rad=math.radians(self.ramp.merge_angle_deg),
+            ),
+            SafetyBudget(**{k: float(v) for k, v in self.safety.model_dump().items()}),
+            MotionLimits(**{k: float(v) for k, v in self.motion.model_dump().items()}),
+            Control(
+                step_s=self.control.step_s,
+                actuation_delay_s=self.control.actuation_delay_s,
+                retry_s=self.control.retry_s,
+                gap_at_front=self.control.gap_position == "front",
+                create_from_nose=self.control.gap_creation_start == "nose",
+            ),
+        )
+
+    @property
+    def last_merge_station_m(self) -> float:
+        """The last station of a merge: a step's travel, and half a metre, before the lane ends."""
+        return self.ramp.acceleration_lane_m - self.mainline.speed_mps * self.control.step_s - 0.5
+
+    @property
+    def mainline_free_flow_s(self) -> float:
+        """Time through the zone at v0."""
+        return (self.mainline.end_m - self.mainline.start_m) / self.mainline.speed_mps
+
+    @property
+    def ramp_free_flow_s(self) -> float:
+        """Time along the ramp at v_R0, up to v0 as in free movement, and on to the zone's end."""
+        v0, ramp_mps = self.mainline.speed_mps, self.ramp.speed_mps
+        lag = lag_m(v0, ramp_mps, self.motion.free_acceleration_mps2)
+        return -self.ramp.start_m / ramp_mps + (self.mainline.end_m + lag) / v0
+
+    @property
+    def fastest_mainline_entry_mps(self) -> float:
+        """The highest speed at which a mainline vehicle may enter."""
+        given = [a.speed_mps for a in self.arrivals if a.stream == "mainline"]
+        return max(given, default=self.mainline.entry_speed_mps[1])
+
+
+def _speed_problems(scenario: Scenario) -> list[str]:
+    mainline, ramp = scenario.mainline, scenario.ramp
+    problems = []
+    if ramp.speed_mps >= mainline.speed_mps:
+        problems.append(
+            f"ramp.speed_mps: {ramp.speed_mps:g} is not below mainline.speed_mps; "
+            f"the method needs a ramp slower than {mainline.speed_mps:g} m/s"
+        )
+    for name, stream in (("mainline", mainline), ("ramp", ramp)):
+        low, high = stream.entry_speed_mps
+        if low > high:
+            problems.append(
+                f"{name}.entry_speed_mps: [{low:g}, {high:g}] falls; write the lower speed first"
+            )
+        for key, value in (("speed_mps", stream.speed_mps), ("entry_speed_mps", high)):
+            if value > stream.limit_mps:
+                problems.append(
+                    f"{name}.{key}: {value:g} is above {name}.limit_mps; "
+                    f"allowed is up to {stream.limit_mps:g} m/s"
+                )
+    return problems
+
+
+def _place_problems(scenario: Scenario) -> list[str]:
+    mainline, ramp = scenario.mainline, scenario.ramp
+    problems = []
+    if mainline.end_m <= ramp.acceleration_lane_m:
+        problems.append(
+            f"mainline.end_m: {mainline.end_m:g} is not beyond the acceleration lane; "
+            f"allowed is above {ramp.acceleration_lane_m:g} m"
+        )
+    if not ramp.start_m < ramp.decision_station_m < ramp.stop_station_m:
+        problems.append(
+            f"ramp.decision_station_m: {ramp.decision_station_m:g} is not on the ramp before the "
+            f"stop; allowed is between {ramp.start_m:g} and {ramp.stop_station_m:g} m"
+        )
+    return problems
+
+
+def _flow_problems(scenario: Scenario) -> list[str]:
+    problems = []
+    for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
+        most = 3600.0 / stream.min_headway_s
+        if stream.flow_veh_h >= most:
+            problems.append(
+                f"{name}.flow_veh_h: {stream.flow_veh_h:g} cannot arrive with headways of "
+                f"{stream.min_headway_s:g} s or more; allowed is below {most:g} veh/h"
+            )
+    last_s: dict[str, float] = {}
+    for number, arrival in enumerate(scenario.arrivals):
+        key = f"arrivals.{number}"
+        limit = getattr(scenario, arrival.stream).limit_mps
+        if arrival.speed_mps > limit:
+            problems.append(
+                f"{key}.speed_mps: {arrival.speed_mps:g} is above {arrival.stream}.limit_mps; "
+                f"allowed is up to {limit:g} m/s"
+            )
+        if arrival.time_s <= last_s.get(arrival.stream, -1.0):
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} does not come after the one before it on the "
+                f"{arrival.stream}; allowed is above {last_s[arrival.stream]:g} s"
+            )
+        if arrival.time_s > scenario.simulation.horizon_s:
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} lies beyond simulation.horizon_s; "
+                f"allowed is up to {scenario.simulation.horizon_s:g} s"
+            )
+        if not is_multiple(arrival.time_s, scenario.control.step_s):
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} is not on the step grid; "
+                f"allowed are multiples of {scenario.control.step_s:g} s"
+            )
+        last_s[arrival.stream] = arrival.time_s
+    return problems
+
+
+def is_multiple(value: float, unit: float) -> bool:
+    """Returns whether ``value`` is a whole multiple of ``unit``, but for rounding."""
+    return abs(value / unit - round(value / unit)) < 1e-6
+
+
+def _clock_problems(scenario: Scenario) -> list[str]:
+    control = scenario.control
+    problems = []
+    if not is_multiple(control.actuation_delay_s, control.step_s):
+        problems.append(
+            f"control.actuation_delay_s: {control.actuation_delay_s:g} is not on the control "
+            f"clock; allowed are multiples of {control.step_s:g} s"
+        )
+    if not is_multiple(1000.0 * control.step_s, 1.0):
+        problems.append(
+            f"control.step_s: {control.step_s:g} is not what SUMO can step; "
+            "allowed are whole milliseconds"
+        )
+    return problems
+
+
+def _planning_problems(scenario: Scenario) -> list[str]:
+    """What only shows once all values are sensible by themselves: can a merge be planned at all?"""
+    mainline, ramp, motion = scenario.mainline, scenario.ramp, scenario.motion
+    v0, ramp_mps = mainline.speed_mps, ramp.speed_mps
+    usable_m, lane_m = scenario.last_merge_station_m, ramp.acceleration_lane_m
+    key = "ramp.acceleration_lane_m"
+    if usable_m <= 0.0:
+        need_m = lane_m - usable_m
+        return [f"{key}: {lane_m:g} is too short to merge in; allowed is above {need_m:g} m"]
+    least = least_acceleration_mps2(v0, ramp_mps, usable_m)
+    if least > motion.ramp_acceleration_mps2:
+        need_m = least * usable_m / motion.ramp_acceleration_mps2 + lane_m - usable_m
+        asked = f"Eq. 22 asks for {least:.2f} m/s2, more than motion.ramp_acceleration_mps2"
+        return [f"{key}: {lane_m:g} is too short: {asked}; allowed is above {need_m:.1f} m"]
+    problems = []
+    if not least <= motion.free_acceleration_mps2 <= motion.ramp_acceleration_mps2:
+        problems.append(
+            f"motion.free_acceleration_mps2: {motion.free_acceleration_mps2:g} is outside Eq. 22; "
+            f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
+        )
+    first, last = decision_station_range_m(scenario)
+    if not first <= ramp.decision_station_m <= last:
+        problems.append(
+            f"ramp.decision_station_m: at {ramp.decision_station_m:g} m not every vehicle that "
+            "matters has entered, or it is too late to stop; "
+            f"allowed is {first:.1f} to {last:.1f} m"
+        )
+    return problems
+
+
+def decision_station_range_m(scenario: Scenario) -> tuple[float, float]:
+    """Returns the first and last station (m) at which a ramp vehicle may be planned.
+
+    The first: a mainline vehicle that enters just then must come behind the subject even if this
+    merges with the least acceleration. The last: from there it can still stop before the nose.
+    """
+    road, safety = scenario.rules().road, scenario.rules().safety
+    v0, ramp_mps = road.mainline_speed_mps, road.ramp_speed_mps
+    motion, control = scenario.motion, scenario.control
+    least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
+    behind_m = (
+        lag_m(v0, ramp_mps, least)
+        + scenario.vehicle.length_m
+        + merge_clearance_m(road, safety)
+        + v0 * control.step_s
+    )
+    first_m = (road.mainline_start_m + behind_m) * ramp_mps / v0
+    stop_m = 0.5 * road.ramp_limit_mps**2 / motion.comfort_mps2
+    reaction_m = road.ramp_limit_mps * (control.actuation_delay_s + control.step_s)
+    return max(first_m, road.ramp_start_m), road.stop_station_m - stop_m - reaction_m

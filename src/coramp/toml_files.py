@@ -1,0 +1,188 @@
+"""Reading TOML files: built-in or the user's, with overrides, into models, with clear errors."""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from coramp.errors import CorampError
+
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
+Data = dict[str, Any]
+
+
+def builtin_names(kind: str) -> list[str]:
+    """Returns the names of the built-in files of a kind: scenarios, studies or snapshots."""
+    folder = resources.files("coramp") / "data" / kind
+    return sorted(
+        f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
+    )
+
+
+def read(kind: str, name: str) -> tuple[str, Data]:
+    """Returns a label for errors and the content of a built-in or a file.
+
+    Raises CorampError where there is neither, or where the file is no TOML or empty.
+    """
+    if name in builtin_names(kind):
+        label = name
+        text = (resources.files("coramp") / "data" / kind / f"{name}.toml").read_text()
+    else:
+        label, text = name, _text_of(Path(name), kind)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CorampError(f"{label}: {error}; allowed is TOML") from error
+    if not data:
+        raise CorampError(
+            f"{label}: the file is empty; allowed is TOML that describes {_what(kind)}"
+        )
+    return label, data
+
+
+def _text_of(path: Path, kind: str) -> str:
+    known = ", ".join(builtin_names(kind))
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        near = difflib.get_close_matches(str(path), builtin_names(kind), 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise CorampError(f"{path}: no such file or built-in{hint}; built in are {known}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise CorampError(f"{path}: cannot be read: {reason}; allowed is a TOML file") from None
+
+
+def _what(kind: str) -> str:
+    return {"scenarios": "a scenario", "studies": "a study", "snapshots": "a snapshot"}[kind]
+
+
+def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
+    """Returns dotted keys and values of ``KEY=VALUE`` texts; a value is TOML, or else a string."""
+    overrides: dict[str, Any] = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise CorampError(f"--set: {text}: is not KEY=VALUE; an example is control.step_s=0.05")
+        try:
+            overrides[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            overrides[key.strip()] = value.strip()
+    return overrides
+
+
+def with_overrides(data: Data, overrides: Mapping[str, Any]) -> Data:
+    """Returns a copy of the data with dotted keys set."""
+    result = _copied(data)
+    for dotted, value in overrides.items():
+        *parents, last = dotted.split(".")
+        table = result
+        for parent in parents:
+            table = table.setdefault(parent, {})
+            if not isinstance(table, dict):
+                raise CorampError(f"--set: {dotted}: {parent} is not a table; see coramp scenarios")
+        table[last] = value
+    return result
+
+
+def _copied(data: Data) -> Data:
+    return {k: _copied(v) if isinstance(v, dict) else v for k, v in data.items()}
+
+
+def validated(
+    model: type[AnyModel], data: Data, label: str, overridden: Mapping[str, str] | None = None
+) -> AnyModel:
+    """Returns the model of the data.
+
+    Raises CorampError with one message for each problem: where, which key, what is wrong, what is
+    allowed. ``overridden`` names where overridden keys came from, to be told instead of the label.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        lines = [line for problem in error.errors() for line in _lines_of(model, problem)]
+    messages = []
+    for line in dict.fromkeys(lines):
+        key = line.split(":", 1)[0]
+        origins = [
+            origin
+            for name, origin in (overridden or {}).items()
+            if key == name or key.startswith(f"{name}.")
+        ]
+        messages.append(f"{origins[0] if origins else label}: {line}")
+    raise CorampError(*messages)
+
+
+def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
+    if problem["type"] == "value_error":
+        return str(problem["ctx"]["error"]).splitlines()
+    key = ".".join(str(part) for part in problem["loc"])
+    value, context = problem["input"], problem.get("ctx", {})
+    shown = f"{value:g}" if isinstance(value, float) else repr(value)
+    match problem["type"]:
+        case "extra_forbidden":
+            return [f"{key}: unknown key; {_allowed_keys(model, problem['loc'])}"]
+        case "missing":
+            return [f"{key}: is missing; it must be given"]
+        case "finite_number":
+            return [f"{key}: {shown} is not finite; allowed is a finite number"]
+        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
+            return [f"{key}: {shown} is {_out_of_range(key, float(value), context)}"]
+        case "float_type" | "int_type":
+            return [f"{key}: {shown} is not a number; allowed is a number"]
+        case "literal_error":
+            return [f"{key}: {shown} is not known; allowed is {context['expected']}"]
+        case "model_type" | "dict_type" | "model_attributes_type":
+            return [f"{key}: {shown} is not a table; allowed is a TOML table"]
+        case (
+            "tuple_type"
+            | "list_type"
+            | "too_short"
+            | "too_long"
+            | "missing_positional_only_argument"
+        ):
+            return [f"{key}: {shown} has the wrong shape; allowed is a list like [15.0, 20.0]"]
+        case _:
+            message = problem["msg"]
+            return [f"{key}: {shown}: {message[0].lower()}{message[1:]}"]
+
+
+def _out_of_range(key: str, value: float, context: Mapping[str, float]) -> str:
+    bounds = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+    (name, bound), *_ = ((n, b) for n, b in context.items() if n in bounds)
+    side = "too small" if name in ("gt", "ge") else "too large"
+    text = f"{side}; allowed is {bounds[name]} {bound:g}"
+    if "speed_mps" in key or "limit_mps" in key:
+        text += " m/s"
+        if name == "le" and math.isfinite(value):
+            text += f" (if {value:g} is meant in km/h, write {value / 3.6:.4g})"
+    return text
+
+
+def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    for part in location[:-1]:
+        field = model.model_fields.get(str(part))
+        inner = field.annotation if field is not None else None
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            model = inner
+        elif not isinstance(part, int):
+            model = _model_within(inner) or model
+    names = sorted(model.model_fields)
+    near = difflib.get_close_matches(str(location[-1]), names, 1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"{hint}allowed are {', '.join(names)}"
+
+
+def _model_within(annotation: Any) -> type[BaseModel] | None:
+    for argument in getattr(annotation, "__args__", ()):
+        if isinstance(argument, type) and issubclass(argument, BaseModel):
+            return argument
+        inner = _model_within(argument)
+        if inner is not None:
+            return inner
+    return None
