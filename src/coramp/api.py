@@ -1,0 +1,229 @@
+"""What notebooks and the command line call: run, study, plan."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from coramp.engines.sumo.engine import SumoOptions
+from coramp.errors import CorampError
+from coramp.explanation import Quantity, quantities
+from coramp.files import staged_folder
+from coramp.metrics.tables import Row
+from coramp.planning import PlannedSnapshot, plan_snapshot
+from coramp.run_folder import MARK, run_content, write_run
+from coramp.running import RunSpec, broken_promises, execute, make_spec
+from coramp.snapshots import load_snapshot
+from coramp.study.definition import expand, load_study
+from coramp.study.runner import Progress, run_missing, usable_cores
+from coramp.study.store import Store
+from coramp.study.summary import summary_tables, to_markdown
+from coramp.study.tables import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run: its summary (the row of ``runs.parquet``) and its records as polars frames."""
+
+    spec: RunSpec
+    summary: Row
+    vehicles: pl.DataFrame
+    speeds: pl.DataFrame
+    trajectories: pl.DataFrame | None
+    decisions: pl.DataFrame | None
+
+    @property
+    def frames(self) -> dict[str, pl.DataFrame]:
+        """The records by name; trajectories and decisions only of cooperative runs."""
+        every = {
+            "vehicles": self.vehicles,
+            "speeds": self.speeds,
+            "trajectories": self.trajectories,
+            "decisions": self.decisions,
+        }
+        return {name: frame for name, frame in every.items() if frame is not None}
+
+    @property
+    def broken_promises(self) -> list[str]:
+        """What a cooperative run promised and did not keep; empty where all is well."""
+        return broken_promises(self.summary)
+
+    @property
+    def content(self) -> Row:
+        """What ``run.json`` holds: specification, versions and summary."""
+        return run_content(self.spec, self.summary)
+
+    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
+        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
+        return {name: as_pandas(frame) for name, frame in self.frames.items()}
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """A study: one row a run, one row a run and stream, and the tables that sum them up."""
+
+    folder: Path
+    runs: pl.DataFrame
+    streams: pl.DataFrame
+    tables: tuple[Table, ...]
+
+    @property
+    def failed(self) -> pl.DataFrame:
+        """The runs that failed, with their errors."""
+        return self.runs.filter(status="failed")
+
+    @property
+    def broken_promises(self) -> list[str]:
+        """What cooperative runs promised and did not keep, with their flows and seeds."""
+        return [
+            f"{row['strategy']}, {row['mainline_veh_h']:g} + {row['ramp_veh_h']:g} veh/h, "
+            f"seed {row['seed']}: {'; '.join(broken)}"
+            for row in self.runs.iter_rows(named=True)
+            if (broken := broken_promises(row))
+        ]
+
+    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
+        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
+        return {"runs": as_pandas(self.runs), "streams": as_pandas(self.streams)}
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """Decisions on a snapshot, and all trajectories before and after them."""
+
+    planned: PlannedSnapshot
+
+    @property
+    def decisions(self) -> pl.DataFrame:
+        """One row a ramp vehicle, as in ``decisions.parquet``."""
+        return self.planned.decisions
+
+    @property
+    def trajectories(self) -> pl.DataFrame:
+        """What every vehicle drives after the decisions, one row a piece."""
+        return self.planned.after
+
+    @property
+    def before(self) -> pl.DataFrame:
+        """What every vehicle would have driven; ramp vehicles stop before the nose."""
+        return self.planned.before
+
+    def quantities(self, vehicle_id: str) -> list[Quantity]:
+        """Returns every intermediate quantity of a ramp vehicle's decision."""
+        rows = self.decisions.filter(vehicle_id=vehicle_id)
+        if rows.is_empty():
+            known = ", ".join(self.decisions["vehicle_id"])
+            raise CorampError(f"{vehicle_id}: was not planned; planned were {known}")
+        return quantities(rows.row(0, named=True), self.planned.scenario)
+
+    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
+        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
+        return {
+            "decisions": as_pandas(self.decisions),
+            "trajectories": as_pandas(self.trajectories),
+        }
+
+
+def run(
+    scenario: str,
+    strategy: str = "mainline-priority",
+    *,
+    engine: str = "sumo",
+    mainline_veh_h: float | None = None,
+    ramp_veh_h: float | None = None,
+    drivers: str | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    horizon_s: float | None = None,
+    out: str | Path | None = None,
+    keep_sumo: bool = False,
+    gui: bool = False,
+) -> RunResult:
+    """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
+
+    ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
+    run (default: fair). Raises CorampError for what cannot be run and for a run that fails.
+
+    >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
+    """
+    spec = make_spec(
+        scenario,
+        strategy,
+        engine=engine,
+        mainline_veh_h=mainline_veh_h,
+        ramp_veh_h=ramp_veh_h,
+        drivers=drivers,
+        overrides=overrides,
+        seed=seed,
+        horizon_s=horizon_s,
+    )
+    if out is None:
+        if keep_sumo:
+            raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
+        return _executed(spec, SumoOptions(gui=gui))
+    with staged_folder(Path(out), MARK) as stage:
+        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
+        write_run(stage, spec, result.frames, result.summary)
+    return result
+
+
+def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
+    tables, row = execute(spec, options)
+    return RunResult(
+        spec, row, tables.vehicles, tables.speeds, tables.trajectories, tables.decisions
+    )
+
+
+def study(
+    name: str,
+    *,
+    seeds: int | None = None,
+    jobs: int | None = None,
+    out: str | Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> StudyResult:
+    """Runs what a study still lacks and returns all of it.
+
+    ``name`` is a built-in study or a TOML file; ``out`` is where it is kept (default:
+    ``out/NAME``), and a study that was interrupted goes on from there. ``jobs`` processes work at
+    a time (default: one a core). ``progress`` is called at the start and after every run. Raises
+    CorampError for a study that cannot be run; runs that fail are rows of the result.
+    """
+    definition = load_study(name)
+    jobs = usable_cores() if jobs is None else jobs
+    if jobs < 1:
+        raise CorampError(f"--jobs: {jobs} is too small; allowed is at least 1")
+    specs = expand(definition, definition.seeds if seeds is None else seeds)
+    folder = Path(out) if out is not None else Path("out") / definition.name
+    store = Store(folder, definition)
+    parts = run_missing(store, specs, jobs, progress or (lambda _: None))
+    runs, streams = store.frames(parts)
+    tables = summary_tables(definition, runs)
+    store.write_tables(runs, streams, to_markdown(definition, tables))
+    return StudyResult(folder, runs, streams, tuple(tables))
+
+
+def plan(snapshot: str, strategy: str = "mainline-priority") -> PlanResult:
+    """Returns what a strategy decides on a snapshot: a built-in name or a TOML file.
+
+    >>> coramp.plan("example").decisions["rung"].item()
+    'reach'
+    """
+    return PlanResult(plan_snapshot(load_snapshot(snapshot), strategy))
+
+
+def as_pandas(frame: pl.DataFrame) -> "pd.DataFrame":
+    """Returns a polars frame as a pandas one, without pyarrow.
+
+    Raises CorampError where pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError:
+        raise CorampError("pandas is not installed; pip install pandas") from None
+    return pd.DataFrame(frame.to_dict(as_series=False))

@@ -1,0 +1,220 @@
+"""The command line: parses, calls one function, prints."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from coramp.errors import CorampError
+
+WRONG, USAGE, UNSAFE, STOPPED = 1, 2, 3, 130
+DEBUG = "--debug"
+
+app = typer.Typer(
+    name="coramp",
+    help="Cooperative on-ramp merging: plan, simulate, compare and explain.",
+    epilog="Example: coramp run paper --mainline 1500 --ramp 700 --seed 77 --out out/r",
+    add_completion=False,
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+StrategyName = Annotated[str, typer.Option("--strategy", "-s", help="See `coramp strategies`.")]
+
+
+@app.callback()
+def _options(
+    _debug: Annotated[bool, typer.Option(DEBUG, help="Show tracebacks of errors.")] = False,
+) -> None:
+    """Cooperative on-ramp merging: plan, simulate, compare and explain."""
+
+
+@app.command(epilog="Example: coramp scenarios --json")
+def scenarios(json: Json = False) -> None:
+    """List the built-in scenarios, snapshots and studies."""
+    from coramp.console import print_json, print_listing
+    from coramp.listing import listing
+
+    found = listing()
+    if json:
+        print_json(found)
+    else:
+        print_listing(found)
+
+
+@app.command(epilog="Example: coramp strategies")
+def strategies(json: Json = False) -> None:
+    """List the strategies."""
+    from coramp.console import print_json, print_listing
+    from coramp.strategies.registry import strategies as registered
+
+    found = {"strategies": {name: s.summary for name, s in registered().items()}}
+    if json:
+        print_json(found)
+    else:
+        print_listing(found)
+
+
+@app.command(epilog="Example: coramp plan example --plot example.png")
+def plan(
+    snapshot: Annotated[str, typer.Argument(help="A built-in snapshot or a TOML file.")],
+    strategy: StrategyName = "mainline-priority",
+    json: Json = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write a time-space diagram (png, svg or pdf).")
+    ] = None,
+) -> None:
+    """Plan one given situation and show every quantity with its equation."""
+    from coramp.api import plan as plan_snapshot
+    from coramp.console import plan_json, print_json, print_plan
+
+    result = plan_snapshot(snapshot, strategy)
+    if plot is not None:
+        from coramp.report.plan_figure import save_plan_figure
+
+        save_plan_figure(result.planned, plot)
+    if json:
+        print_json(plan_json(result))
+    else:
+        print_plan(result)
+
+
+@app.command(
+    epilog="Example: coramp run paper -s ramp-priority --mainline 1800 --ramp 500 --out out/r"
+)
+def run(
+    scenario: Annotated[str, typer.Argument(help="A built-in scenario or a TOML file.")],
+    strategy: StrategyName = "mainline-priority",
+    engine: Annotated[str, typer.Option(help="What moves the vehicles: sumo.")] = "sumo",
+    mainline: Annotated[float | None, typer.Option(help="Mainline flow in veh/h.")] = None,
+    ramp: Annotated[float | None, typer.Option(help="Ramp flow in veh/h.")] = None,
+    drivers: Annotated[
+        str | None, typer.Option(help="Who drives uncontrolled vehicles: paper or fair.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of arrivals, speeds and SUMO.")] = 1,
+    horizon: Annotated[float | None, typer.Option(help="Seconds of arrivals.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the records.")] = None,
+    keep_sumo: Annotated[bool, typer.Option(help="Keep SUMO's own files in OUT/sumo.")] = False,
+    gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
+    json: Json = False,
+) -> None:
+    """Run one scenario."""
+    from coramp.api import run as run_scenario
+    from coramp.console import print_json, print_run, working
+    from coramp.toml_files import parse_overrides
+
+    with working("running in SUMO"):
+        result = run_scenario(
+            scenario,
+            strategy,
+            engine=engine,
+            mainline_veh_h=mainline,
+            ramp_veh_h=ramp,
+            drivers=drivers,
+            overrides=parse_overrides(settings or []),
+            seed=seed,
+            horizon_s=horizon,
+            out=out,
+            keep_sumo=keep_sumo,
+            gui=gui,
+        )
+    if json:
+        print_json(result.content)
+    else:
+        print_run(result, out)
+    _exit_if_broken(result.broken_promises)
+
+
+@app.command(epilog="Example: coramp study paper --seeds 10 --out out/p10")
+def study(
+    name: Annotated[str, typer.Argument(help="A built-in study or a TOML file.")],
+    seeds: Annotated[int | None, typer.Option(help="Seeds 1 to N (default: the study's).")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder (default: out/NAME).")] = None,
+    json: Json = False,
+) -> None:
+    """Run a grid of runs; go on where an earlier start left off."""
+    from coramp.api import study as run_study
+    from coramp.console import StudyProgress, print_json, print_study, study_json
+
+    with StudyProgress() as progress:
+        result = run_study(name, seeds=seeds, jobs=jobs, out=out, progress=progress)
+    if json:
+        print_json(study_json(result))
+    else:
+        print_study(result)
+    _exit_if_broken(result.broken_promises)
+    if result.failed.height:
+        raise CorampError(
+            f"{result.failed.height} runs failed; see the error column of "
+            f"{result.folder / 'runs.parquet'}, and start again to repeat them"
+        )
+
+
+@app.command(epilog="Example: coramp explain out/r r00012")
+def explain(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
+    vehicle: Annotated[str, typer.Argument(help="A vehicle's id, such as r00012.")],
+    json: Json = False,
+) -> None:
+    """Tell one vehicle's story: why it got its plan, with the equations' numbers."""
+    from coramp.console import print_json, print_story, story_json
+    from coramp.story import story_of
+
+    story = story_of(folder, vehicle)
+    if json:
+        print_json(story_json(story))
+    else:
+        print_story(story)
+
+
+def _exit_if_broken(broken: list[str]) -> None:
+    if broken:
+        for line in broken:
+            print(f"Unsafe: {line}", file=sys.stderr)
+        raise typer.Exit(UNSAFE)
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Runs the command line and exits: 0 fine, 1 wrong value or failed run, 2 usage, 3 unsafe."""
+    given = sys.argv[1:] if arguments is None else arguments
+    debug = DEBUG in given
+    try:
+        code = app([word for word in given if word != DEBUG], standalone_mode=False)
+    except Exception as error:
+        if debug:
+            raise
+        sys.exit(_report(error))
+    except KeyboardInterrupt:
+        print("Error: stopped; start again to go on where this left off", file=sys.stderr)
+        sys.exit(STOPPED)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _report(error: Exception) -> int:
+    """Prints an error in one line for each of its messages; returns the exit code."""
+    match error:
+        case CorampError():
+            code, messages = WRONG, error.messages
+        case typer.BadParameter() if not hasattr(error, "param_type"):  # that is a missing one
+            code, messages = WRONG, (error.format_message(),)
+        case typer.TyperException():
+            command = getattr(getattr(error, "ctx", None), "command_path", "coramp")
+            text = error.format_message().rstrip(".")
+            code, messages = USAGE, (f"{text}; see {command} --help",)
+        case typer.Abort():
+            code, messages = STOPPED, ("stopped",)
+        case _:
+            text = f"unexpected {type(error).__name__}: {error}; add {DEBUG} to see where"
+            code, messages = WRONG, (text,)
+    for message in messages:
+        print(f"Error: {' '.join(str(message).split())}", file=sys.stderr)
+    return code

@@ -1,0 +1,94 @@
+"""One decision on a snapshot: every ramp vehicle in it is planned, front first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+
+from coramp._kernel import FloatArray
+from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.driven import driven_pieces
+from coramp.coordination.plant import Arrival
+from coramp.errors import CorampError
+from coramp.metrics.schemas import TRAJECTORIES
+from coramp.metrics.tables import decisions_table
+from coramp.records import LANES
+from coramp.scenario import Scenario
+from coramp.snapshots import Snapshot, SnapshotVehicle
+from coramp.strategies.registry import strategy_named
+
+
+@dataclass(frozen=True)
+class PlannedSnapshot:
+    """What was decided, and the trajectories before and after."""
+
+    snapshot: Snapshot
+    scenario: Scenario
+    strategy: str
+    decisions: pl.DataFrame
+    before: pl.DataFrame
+    after: pl.DataFrame
+
+
+class _Nowhere:
+    """A plant that carries nobody."""
+
+    def advance(self, step: int) -> None:
+        """Does nothing."""
+
+    def enter(self, row: int, arrival: Arrival, step: int) -> None:
+        """Does nothing."""
+
+    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+        """Does nothing."""
+
+
+def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
+    """Returns the decisions of a strategy on a snapshot, at time 0.
+
+    Raises CorampError where the strategy plans nothing, or the situation is lost already.
+    """
+    chosen = strategy_named(strategy)
+    if not chosen.cooperative:
+        raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
+    scenario = snapshot.road()
+    vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))
+    arrivals = [
+        Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.vehicle.length_m)
+        for v in vehicles
+    ]
+    coordinator = Coordinator(
+        chosen(),
+        scenario.rules(),
+        arrivals,
+        scenario.fastest_mainline_entry_mps,
+        _Nowhere(),
+    )
+    for number, vehicle in enumerate(vehicles):
+        if not coordinator.place(number, vehicle.station_m, 0):
+            raise CorampError(
+                f"vehicles: {vehicle.id} can no longer keep its distance; allowed are situations "
+                "in which braking is still enough"
+            )
+    before = _trajectories(coordinator, vehicles)
+    coordinator.decide_now(0)
+    names = [vehicle.id for vehicle in vehicles]
+    return PlannedSnapshot(
+        snapshot,
+        scenario,
+        strategy,
+        decisions_table(coordinator.decisions, names, np.arange(len(names))),
+        before,
+        _trajectories(coordinator, vehicles),
+    )
+
+
+def _trajectories(coordinator: Coordinator, vehicles: Sequence[SnapshotVehicle]) -> pl.DataFrame:
+    ledger = coordinator.ledger
+    exits_s = [ledger.exit_time_s(row) for row in range(len(ledger))]
+    end_s = max([exit_s for exit_s in exits_s if np.isfinite(exit_s)], default=60.0)
+    first, lane, rows = driven_pieces(ledger, np.arange(len(vehicles)), len(vehicles), end_s)
+    names = [v.id for v, n in zip(vehicles, np.diff(first), strict=True) for _ in range(n)]
+    columns = [names, [LANES[code] for code in lane], *(rows[:, k] for k in range(4))]
+    return pl.DataFrame(dict(zip(TRAJECTORIES, columns, strict=True)), schema=TRAJECTORIES)

@@ -1,0 +1,60 @@
+"""What a run leaves in its folder, and reading it back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from coramp.errors import CorampError
+from coramp.files import read_json, write_json, write_parquet
+from coramp.metrics.tables import Row
+from coramp.running import RunSpec, finite_or_none, versions
+
+MARK = "run.json"
+TABLES = ("vehicles", "trajectories", "decisions", "speeds")
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run as read from its folder; trajectories and decisions only of cooperative runs."""
+
+    content: Row
+    vehicles: pl.DataFrame
+    speeds: pl.DataFrame
+    trajectories: pl.DataFrame | None
+    decisions: pl.DataFrame | None
+
+
+def run_content(spec: RunSpec, row: Row) -> Row:
+    """Returns what ``run.json`` holds and ``coramp run --json`` prints."""
+    content = {"kind": "run", **spec.as_data(), "versions": versions(), "summary": row}
+    return {key: finite_or_none(value) for key, value in content.items()}
+
+
+def write_run(folder: Path, spec: RunSpec, frames: Mapping[str, pl.DataFrame], row: Row) -> None:
+    """Writes all files of a run into an existing folder; ``frames`` are named as in ``TABLES``."""
+    for name, frame in frames.items():
+        if name in TABLES:
+            write_parquet(folder / f"{name}.parquet", frame)
+    write_json(folder / MARK, run_content(spec, row))
+
+
+def read_run(folder: Path) -> StoredRun:
+    """Returns a run from its folder; raises CorampError where there is none."""
+    if not (folder / MARK).exists():
+        raise CorampError(
+            f"{folder}: holds no run; give a folder that coramp run --out has written"
+        )
+    content = read_json(folder / MARK)
+    frames = {}
+    for name in TABLES:
+        path = folder / f"{name}.parquet"
+        try:
+            frames[name] = pl.read_parquet(path) if path.exists() else None
+        except (OSError, pl.exceptions.PolarsError) as error:
+            raise CorampError(f"{path}: cannot be read: {error}; run again") from error
+    vehicles, speeds = frames["vehicles"], frames["speeds"]
+    if vehicles is None or speeds is None:
+        raise CorampError(f"{folder}: is not complete; run again with the same --out")
+    return StoredRun(content, vehicles, speeds, frames["trajectories"], frames["decisions"])

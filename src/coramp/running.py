@@ -1,0 +1,194 @@
+"""One run, from its specification to its tables."""
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
+from coramp.errors import CorampError
+from coramp.loading import drivers_checked, load_scenario
+from coramp.metrics.schemas import RESULT_VERSION, RUN_METRICS
+from coramp.metrics.tables import Row, RunTables, tables_of
+from coramp.scenario import Scenario
+from coramp.strategies.registry import strategy_named
+
+ENGINES = ("sumo",)
+DEFAULT_DRIVERS = "fair"
+LARGEST_PLAN_ERROR_M = 0.05
+FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """Everything that determines a run. ``overrides`` are what was set beside the flows."""
+
+    scenario: Scenario
+    strategy: str
+    engine: str
+    drivers: str | None
+    seed: int
+    overrides: tuple[tuple[str, Any], ...] = ()
+
+    @cached_property
+    def run_id(self) -> str:
+        """A hash of the whole specification and of the version of results."""
+        content = [
+            RESULT_VERSION,
+            metadata.version("libsumo"),
+            self.scenario.model_dump(mode="json"),
+            self.strategy,
+            self.engine,
+            self.drivers,
+            self.seed,
+        ]
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def keys(self) -> Row:
+        """The columns that runs are sorted by, and the overrides."""
+        return {
+            "scenario": self.scenario.name,
+            "drivers": self.drivers,
+            "strategy": self.strategy,
+            "engine": self.engine,
+            "mainline_veh_h": float(self.scenario.mainline.flow_veh_h),
+            "ramp_veh_h": float(self.scenario.ramp.flow_veh_h),
+            "seed": self.seed,
+            "overrides": " ".join(f"{key}={value}" for key, value in self.overrides) or None,
+        }
+
+    def as_data(self) -> Row:
+        """Returns the specification as plain data."""
+        content = self.scenario.model_dump(mode="json")
+        return {"run_id": self.run_id, **self.keys, "specification": content}
+
+
+def make_spec(
+    scenario: str,
+    strategy: str = "mainline-priority",
+    *,
+    engine: str = "sumo",
+    mainline_veh_h: float | None = None,
+    ramp_veh_h: float | None = None,
+    drivers: str | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    horizon_s: float | None = None,
+) -> RunSpec:
+    """Returns the specification of a run; raises CorampError for what cannot be run."""
+    chosen = strategy_named(strategy)
+    if engine not in ENGINES:
+        raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
+    if not 0 <= seed < 2**31:
+        raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
+    settings = dict(overrides or {})
+    named = {
+        "mainline.flow_veh_h": mainline_veh_h,
+        "ramp.flow_veh_h": ramp_veh_h,
+        "simulation.horizon_s": horizon_s,
+    }
+    settings.update({key: float(value) for key, value in named.items() if value is not None})
+    loaded = load_scenario(scenario, settings)
+    population = None
+    if not chosen.cooperative:
+        population = drivers_checked(loaded, drivers or DEFAULT_DRIVERS)
+    return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, settings))
+
+
+def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """Returns what was set beside the flows and differs from the scenario as it is."""
+    others = {key: value for key, value in settings.items() if key not in FLOW_KEYS}
+    if not others:
+        return ()
+    try:
+        plain = load_scenario(scenario).model_dump(mode="json")
+    except CorampError:  # valid only with its overrides
+        return tuple(sorted(others.items()))
+    return tuple(sorted((k, v) for k, v in others.items() if _looked_up(plain, k) != v))
+
+
+def _looked_up(data: Any, dotted: str) -> Any:
+    for part in dotted.split("."):
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
+
+
+def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTables, Row]:
+    """Returns the tables of a run and its row of ``runs.parquet``.
+
+    Raises CorampError where the run fails.
+    """
+    options = options or SumoOptions()
+    started = time.perf_counter()
+    strategy = strategy_named(spec.strategy)()
+    if strategy.cooperative:
+        outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
+    else:
+        drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
+        outcome = run_uncontrolled(spec.scenario, drivers, spec.seed, options)
+    tables = tables_of(outcome, spec.scenario)
+    row = {
+        "run_id": spec.run_id,
+        **spec.keys,
+        "status": "ok",
+        "error": None,
+        **tables.metrics,
+        "wall_s": time.perf_counter() - started,
+    }
+    return tables, row
+
+
+def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
+    """Returns the row of a run that failed."""
+    nothing = dict.fromkeys(RUN_METRICS)
+    return {
+        "run_id": spec.run_id,
+        **spec.keys,
+        "status": "failed",
+        "error": error,
+        **nothing,
+        "wall_s": wall_s,
+    }
+
+
+def broken_promises(row: Mapping[str, Any]) -> list[str]:
+    """Returns in words what a cooperative run promised and did not keep; nothing for others."""
+    if row["status"] != "ok" or row["drivers"] is not None:
+        return []
+    broken = []
+    if row["collisions"]:
+        broken.append(f"{row['collisions']} collisions in SUMO")
+    if row["safety_violations"]:
+        broken.append(f"{row['safety_violations']} pairs nearer than the safe distance")
+    if row["plan_error_m"] is not None and row["plan_error_m"] > LARGEST_PLAN_ERROR_M:
+        broken.append(f"driven {row['plan_error_m']:.3f} m off plan")
+    return broken
+
+
+def versions() -> dict[str, str]:
+    """Returns the versions that a result depends on."""
+    import platform
+
+    names = ("coramp", "libsumo", "eclipse-sumo", "numpy", "numba", "polars")
+    return {**{name: metadata.version(name) for name in names}, "python": platform.python_version()}
+
+
+def finite_or_none(value: Any) -> Any:
+    """Returns plain data in which numbers that JSON has no word for are None."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: finite_or_none(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_or_none(inner) for inner in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value

@@ -1,0 +1,40 @@
+"""Means over seeds with their intervals, and the paper's improvement rates (Eq. 46, 47)."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from scipy.special import stdtrit
+
+CONFIDENCE = 0.95
+
+
+class Estimate(NamedTuple):
+    """A mean and half the width of its 95 % interval; nan where there is none."""
+
+    mean: float
+    half_width: float
+    values: int
+
+
+def estimate(values: Sequence[float]) -> Estimate:
+    """Returns the mean and its interval by Student's t; one value has no interval."""
+    n = len(values)
+    if n == 0:
+        return Estimate(math.nan, math.nan, 0)
+    mean = math.fsum(values) / n
+    if n == 1:
+        return Estimate(mean, math.nan, 1)
+    variance = math.fsum((value - mean) ** 2 for value in values) / (n - 1)
+    quantile = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2.0))
+    return Estimate(mean, quantile * math.sqrt(variance / n), n)
+
+
+def improvement_rate(controlled: float, uncontrolled: float) -> float:
+    """Returns I = 1 - D / D_k as a share (Eq. 46 for mainline, Eq. 47 for ramp priority).
+
+    Raises ValueError for a D_k of 0.
+    """
+    if uncontrolled == 0.0:
+        raise ValueError("without a baseline delay there is no improvement rate")
+    return 1.0 - controlled / uncontrolled

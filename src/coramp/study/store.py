@@ -1,0 +1,142 @@
+"""The store of a study: one part file a run, written when it is done, and the tables at the end.
+
+A part carries a checksum, so that what was interrupted or damaged is found and run again.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from coramp.errors import CorampError
+from coramp.files import made_folder, read_json, write_json, write_parquet, write_text
+from coramp.metrics.schemas import RESULT_VERSION, RUNS, STREAMS
+from coramp.metrics.tables import Row
+from coramp.running import RunSpec, versions
+from coramp.study.definition import Study
+
+MARK = "study.json"
+PARTS = "parts"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one run leaves in a study."""
+
+    run: Row
+    streams: list[Row]
+
+
+class Store:
+    """The folder of a study."""
+
+    def __init__(self, folder: Path, study: Study) -> None:
+        """Opens or makes the folder.
+
+        Raises CorampError where it holds another study, a run or foreign files.
+        """
+        self.folder = folder
+        self._claim(study)
+        made_folder(folder / PARTS)
+
+    def _claim(self, study: Study) -> None:
+        content = {
+            "kind": "study",
+            "result_version": RESULT_VERSION,
+            "study": study.model_dump(mode="json"),
+            "versions": versions(),
+        }
+        mark = self.folder / MARK
+        if mark.exists():
+            found = read_json(mark)
+            if not isinstance(found, dict) or found.get("kind") != "study":
+                raise CorampError(f"{mark}: does not describe a study; give another folder")
+            if found.get("result_version") != RESULT_VERSION:
+                raise CorampError(
+                    f"{self.folder}: was written by another version of coramp (results "
+                    f"{found.get('result_version')}, this one writes {RESULT_VERSION}); "
+                    "give another folder"
+                )
+            if found.get("study") != content["study"]:
+                name = found.get("study", {}).get("name")
+                raise CorampError(
+                    f"{self.folder}: holds another study ({name!r} with another definition); "
+                    "give another folder"
+                )
+            return
+        if self.folder.exists() and not self.folder.is_dir():
+            raise CorampError(f"{self.folder}: is a file; give a folder")
+        if self.folder.exists() and any(self.folder.iterdir()):
+            raise CorampError(
+                f"{self.folder}: holds other files and no study; give another or an empty folder"
+            )
+        made_folder(self.folder)
+        write_json(mark, content)
+
+    def part_path(self, spec: RunSpec) -> Path:
+        """Returns where the part of a run lies."""
+        return self.folder / PARTS / f"{spec.run_id}.json"
+
+    def read(self, spec: RunSpec) -> Part | None:
+        """Returns the part of a run, None if it is missing or damaged or the run had failed."""
+        try:
+            content = json.loads(self.part_path(spec).read_text(encoding="utf-8"))
+            if content["sha256"] != _checksum(content["run"], content["streams"]):
+                return None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        if content["run"].get("status") != "ok":
+            return None
+        return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
+
+    def is_damaged(self, spec: RunSpec) -> bool:
+        """Returns whether there is a part that cannot be used."""
+        path = self.part_path(spec)
+        if not path.exists() or self.read(spec) is not None:
+            return False
+        try:
+            return bool(json.loads(path.read_text(encoding="utf-8"))["run"]["status"] != "failed")
+        except (OSError, ValueError, KeyError, TypeError):
+            return True
+
+    def write(self, spec: RunSpec, part: Part) -> None:
+        """Writes the part of a run."""
+        run, streams = _encoded(part.run), [_encoded(row) for row in part.streams]
+        content = {"run": run, "streams": streams, "sha256": _checksum(run, streams)}
+        write_json(self.part_path(spec), content)
+
+    def frames(self, parts: Iterable[Part]) -> tuple[pl.DataFrame, pl.DataFrame]:
+        """Returns the tables of runs and of streams, in the order of the parts."""
+        parts = list(parts)
+        runs = pl.DataFrame([part.run for part in parts], schema=RUNS, orient="row")
+        rows = [row for part in parts for row in part.streams]
+        return runs, pl.DataFrame(rows, schema=STREAMS, orient="row")
+
+    def write_tables(self, runs: pl.DataFrame, streams: pl.DataFrame, markdown: str) -> None:
+        """Writes ``runs.parquet``, ``streams.parquet`` and ``tables.md``."""
+        write_parquet(self.folder / "runs.parquet", runs)
+        write_parquet(self.folder / "streams.parquet", streams)
+        write_text(self.folder / "tables.md", markdown)
+
+
+def _checksum(run: Row, streams: list[Row]) -> str:
+    text = json.dumps([run, streams], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _encoded(row: Row) -> Row:
+    """Infinity as text: JSON has no word for it."""
+    return {k: str(v) if isinstance(v, float) and math.isinf(v) else v for k, v in row.items()}
+
+
+def _decoded(row: Row) -> Row:
+    return {k: _number(v) if v in ("inf", "-inf") else v for k, v in row.items()}
+
+
+def _number(text: Any) -> float:
+    return float(text)

@@ -1,0 +1,111 @@
+"""The tables that sum up a study, from its runs alone."""
+
+import math
+from collections.abc import Iterable
+
+import polars as pl
+
+from coramp.running import broken_promises
+from coramp.study.definition import Study
+from coramp.study.paper_layout import paper_tables
+from coramp.study.sensitivity_layout import sensitivity_tables
+from coramp.study.statistics import Estimate, estimate
+from coramp.study.tables import Table, number, with_interval
+
+GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
+
+
+def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
+    """Returns a study's tables: those of its layout, then every group of runs, then promises."""
+    good = runs.filter(status="ok")
+    tables: list[Table] = []
+    if study.layout == "paper":
+        tables += paper_tables(good)
+    if study.layout == "sensitivity":
+        tables += sensitivity_tables(good)
+    return [*tables, overview(good), promises(runs)]
+
+
+def overview(good: pl.DataFrame) -> Table:
+    """Returns one row a group of runs that differ only by their seed."""
+    rows = []
+    for key, group in good.group_by(GROUP, maintain_order=True):
+        scenario, overrides, drivers, strategy, engine, mainline, ramp = key
+        rows.append(
+            (
+                " ".join(str(part) for part in (scenario, overrides) if part),
+                f"{strategy} ({drivers})" if drivers else str(strategy),
+                str(engine),
+                f"{mainline:g} + {ramp:g}",
+                str(group.height),
+                with_interval(of(group, "mainline_delay_s")),
+                with_interval(of(group, "ramp_delay_s")),
+                with_interval(of(group, "mainline_speed_mps")),
+                with_interval(of(group, "ramp_speed_mps")),
+                with_interval(of(group, "fuel_l")),
+                str(group["unserved"].sum()),
+                number(smallest(group["min_ttc_s"])),
+                number(largest(group["max_decel_mps2"])),
+            )
+        )
+    columns = (
+        "scenario",
+        "strategy",
+        "engine",
+        "flow (veh/h)",
+        "runs",
+        "mainline delay (s)",
+        "ramp delay (s)",
+        "mainline speed (m/s)",
+        "ramp speed (m/s)",
+        "fuel (l)",
+        "unserved",
+        "min TTC (s)",
+        "hardest braking (m/s2)",
+    )
+    note = "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle."
+    return Table("All runs", columns, tuple(rows), (note,))
+
+
+def promises(runs: pl.DataFrame) -> Table:
+    """Returns what the cooperative runs promised, and kept or not, and how many runs failed."""
+    cooperative = runs.filter(pl.col("drivers").is_null() & (pl.col("status") == "ok"))
+    broken = sum(bool(broken_promises(row)) for row in cooperative.iter_rows(named=True))
+    margin_m = smallest(cooperative["min_margin_m"])
+    error_m = largest(cooperative["plan_error_m"])
+    rows = (
+        ("cooperative runs", str(cooperative.height)),
+        ("runs that broke a promise", str(broken)),
+        ("collisions in SUMO", str(cooperative["collisions"].sum())),
+        ("safe-distance violations", str(cooperative["safety_violations"].sum())),
+        ("smallest margin over the safe distance (m)", number(margin_m, 3)),
+        ("largest difference between plan and SUMO (m)", number(error_m, 4)),
+        ("vehicles unserved", str(cooperative["unserved"].sum())),
+        ("failed runs", str(runs.filter(status="failed").height)),
+    )
+    return Table("Promises", ("what", "value"), rows)
+
+
+def of(group: pl.DataFrame, column: str) -> Estimate:
+    """Returns the estimate of a column over the runs that have it."""
+    return estimate(group[column].drop_nulls().to_list())
+
+
+def smallest(values: pl.Series) -> float:
+    """Returns the smallest value, nan for none."""
+    return min(values.drop_nulls(), default=math.nan)
+
+
+def largest(values: pl.Series) -> float:
+    """Returns the largest value, nan for none."""
+    return max(values.drop_nulls(), default=math.nan)
+
+
+def to_markdown(study: Study, tables: Iterable[Table]) -> str:
+    """Returns the text of ``tables.md``."""
+    head = (
+        f"# Study {study.name}\n\n{study.description}\n"
+        if study.description
+        else f"# Study {study.name}\n"
+    )
+    return "\n".join([head, *(table.to_markdown() for table in tables)])
