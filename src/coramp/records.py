@@ -36,15 +36,13 @@ class Passages:
 
 @dataclass(frozen=True)
 class Pieces:
-    """How all vehicles drove: pieces of shape (n, 4) as in ``core.trajectory``.
+    """How all vehicles drive: pieces of shape (n, 4) as in ``core.trajectory``.
 
     ``first`` has one entry a vehicle of the passages and one more: vehicle i's rows are first[i]
-    to first[i + 1]. ``lane`` has a code for each row. For drivers of a simulator there is a piece
-    for each of its steps.
+    to first[i + 1].
     """
 
     first: IntArray
-    lane: IntArray
     rows: FloatArray
 
 
@@ -52,13 +50,17 @@ class Pieces:
 class Outcome:
     """Everything that an engine hands to the metrics.
 
-    ``end_s`` is when the run ended or was cut off. Decisions name vehicles by rows of the ledger;
-    ``vehicle_of_row`` gives their places in ``passages``.
+    ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
+    simulator made of it; for its own drivers both are its steps. ``end_s`` is when the run ended or
+    was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
+    places in ``passages``.
     """
 
     cooperative: bool
     passages: Passages
     pieces: Pieces
+    lane: IntArray
+    driven: Pieces
     end_s: float
     collisions: int
     decisions: tuple[DecisionRecord, ...] = ()

@@ -13,9 +13,12 @@ from coramp.core.conflict_risk import GRAVITY_MPS2
 from coramp.core.gaps import least_acceleration_mps2
 from coramp.core.ramp_acceleration import lag_m
 from coramp.core.rules import Control, MotionLimits, Road, Rules, SafetyBudget
-from coramp.core.safe_distance import merge_clearance_m
+from coramp.core.safe_distance import braking_distance_m, merge_clearance_m
 
 FASTEST_MPS = 60.0
+NEAREST_STOP_M = -1.0
+GRIP_SHARE = 0.95
+"""Of the braking that Eq. 3 allows, what stops before the nose use."""
 
 
 class Model(BaseModel):
@@ -45,7 +48,11 @@ class Mainline(Model):
 
 
 class Ramp(Model):
-    """The ramp, which ends at station 0, and the acceleration lane behind it."""
+    """The ramp, which ends at station 0, and the acceleration lane behind it.
+
+    ``stop_station_m`` is where a vehicle stops that has no merge yet; left out, it is as near to
+    the nose as still lets it reach v0 in time from a stand.
+    """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
     speed_mps: Speed
@@ -56,7 +63,7 @@ class Ramp(Model):
     acceleration_lane_m: Annotated[float, Field(gt=0.0, le=5000.0)]
     merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
     decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0
-    stop_station_m: Annotated[float, Field(lt=0.0)] = -1.0
+    stop_station_m: Annotated[float, Field(lt=0.0)] | None = None
 
 
 class Vehicle(Model):
@@ -162,7 +169,7 @@ class Scenario(Model):
                 mainline_end_m=self.mainline.end_m,
                 ramp_start_m=self.ramp.start_m,
                 decision_station_m=self.ramp.decision_station_m,
-                stop_station_m=self.ramp.stop_station_m,
+                stop_station_m=self.stop_station_m,
                 acceleration_lane_m=self.ramp.acceleration_lane_m,
                 last_merge_station_m=self.last_merge_station_m,
                 mainline_speed_mps=self.mainline.speed_mps,
@@ -170,8 +177,8 @@ class Scenario(Model):
                 ramp_limit_mps=self.ramp.limit_mps,
                 merge_angle_rad=math.radians(self.ramp.merge_angle_deg),
             ),
-            SafetyBudget(**{k: float(v) for k, v in self.safety.model_dump().items()}),
-            MotionLimits(**{k: float(v) for k, v in self.motion.model_dump().items()}),
+            SafetyBudget(**self.safety.model_dump()),
+            MotionLimits(stop_mps2=self.stop_mps2, **self.motion.model_dump()),
             Control(
                 step_s=self.control.step_s,
                 actuation_delay_s=self.control.actuation_delay_s,
@@ -185,6 +192,34 @@ class Scenario(Model):
     def last_merge_station_m(self) -> float:
         """The last station of a merge: a step's travel, and half a metre, before the lane ends."""
         return self.ramp.acceleration_lane_m - self.mainline.speed_mps * self.control.step_s - 0.5
+
+    @property
+    def stop_station_m(self) -> float:
+        """Where ramp vehicles stop: as given, or as near to the nose as a restart allows.
+
+        From there ``speed_up`` must bring a vehicle to the least speed at the nose with which the
+        largest acceleration reaches v0 on the acceleration lane: v^2 = v0^2 - 2 a S_a.
+        """
+        if self.ramp.stop_station_m is not None:
+            return self.ramp.stop_station_m
+        return min(NEAREST_STOP_M, -self.run_up_m - 0.1)
+
+    @property
+    def stop_mps2(self) -> float:
+        """How hard (m/s2) a vehicle brakes towards a stop: comfortably, and as Eq. 3 allows.
+
+        Behind a standing vehicle Eq. 3 asks for v^2 / (2 g (phi + psi)): whoever brakes harder
+        than g (phi + psi) comes too near.
+        """
+        grip_mps2 = 0.5 / braking_distance_m(1.0, self.safety.adhesion, self.safety.resistance)
+        return min(self.motion.comfort_mps2, GRIP_SHARE * grip_mps2)
+
+    @property
+    def run_up_m(self) -> float:
+        """The way (m) that a standing ramp vehicle needs before the nose to reach v0 in time."""
+        v0, most = self.mainline.speed_mps, self.motion.ramp_acceleration_mps2
+        nose_square = v0 * v0 - 2.0 * most * self.last_merge_station_m
+        return max(0.0, 0.5 * nose_square / self.motion.speed_up_mps2)
 
     @property
     def mainline_free_flow_s(self) -> float:
@@ -236,10 +271,15 @@ def _place_problems(scenario: Scenario) -> list[str]:
             f"mainline.end_m: {mainline.end_m:g} is not beyond the acceleration lane; "
             f"allowed is above {ramp.acceleration_lane_m:g} m"
         )
-    if not ramp.start_m < ramp.decision_station_m < ramp.stop_station_m:
+    if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
         problems.append(
             f"ramp.decision_station_m: {ramp.decision_station_m:g} is not on the ramp before the "
-            f"stop; allowed is between {ramp.start_m:g} and {ramp.stop_station_m:g} m"
+            f"stop; allowed is between {ramp.start_m:g} and {scenario.stop_station_m:g} m"
+        )
+    if scenario.stop_station_m > -scenario.run_up_m:
+        problems.append(
+            f"ramp.stop_station_m: {scenario.stop_station_m:g} is too near to the nose to reach v0 "
+            f"from a stand; allowed is up to {-scenario.run_up_m:g} m"
         )
     return problems
 
@@ -340,7 +380,7 @@ def decision_station_range_m(scenario: Scenario) -> tuple[float, float]:
     """
     road, safety = scenario.rules().road, scenario.rules().safety
     v0, ramp_mps = road.mainline_speed_mps, road.ramp_speed_mps
-    motion, control = scenario.motion, scenario.control
+    control = scenario.control
     least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
     behind_m = (
         lag_m(v0, ramp_mps, least)
@@ -349,6 +389,6 @@ def decision_station_range_m(scenario: Scenario) -> tuple[float, float]:
         + v0 * control.step_s
     )
     first_m = (road.mainline_start_m + behind_m) * ramp_mps / v0
-    stop_m = 0.5 * road.ramp_limit_mps**2 / motion.comfort_mps2
+    stop_m = 0.5 * road.ramp_limit_mps**2 / scenario.stop_mps2
     reaction_m = road.ramp_limit_mps * (control.actuation_delay_s + control.step_s)
     return max(first_m, road.ramp_start_m), road.stop_station_m - stop_m - reaction_m

@@ -75,10 +75,10 @@ def _place_problems(snapshot: Snapshot, scenario: Scenario) -> list[str]:
             first_m, last_m = scenario.mainline.start_m, scenario.mainline.end_m
             limit_mps = scenario.mainline.limit_mps
         else:
-            braking_m = 0.5 * vehicle.speed_mps**2 / scenario.motion.comfort_mps2
+            braking_m = 0.5 * vehicle.speed_mps**2 / scenario.stop_mps2
             reaction_m = vehicle.speed_mps * scenario.control.actuation_delay_s
             first_m = scenario.ramp.start_m
-            last_m = scenario.ramp.stop_station_m - braking_m - reaction_m
+            last_m = scenario.stop_station_m - braking_m - reaction_m
             limit_mps = scenario.ramp.limit_mps
         if not first_m <= vehicle.station_m <= last_m:
             why = ", where it can still stop before the nose" if vehicle.stream == "ramp" else ""

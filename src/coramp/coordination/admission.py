@@ -9,14 +9,8 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.approach import (
-    append_stop,
-    approach_without_stop,
-    harmonise,
-    stop_starts_s,
-)
+from coramp.core.approach import append_stop, harmonise, stop_of_m, stop_starts_s
 from coramp.core.fleet import (
-    MAX_CHANGED,
     ROUNDING_M,
     Fleet,
     Proposal,
@@ -26,17 +20,16 @@ from coramp.core.fleet import (
     trajectory_under,
 )
 from coramp.core.proposals import largest_safe_distance_m
+from coramp.core.ramp_queue import propose_place_ahead
 from coramp.core.rules import Rules
-from coramp.core.safe_distance import safe_distance_m
+from coramp.core.safe_distance import standing_clearance_m
 from coramp.core.trajectory import (
     MAX_PIECES,
-    STATION,
     intercept_range_m,
     station_and_speed,
     time_at_station,
 )
 
-BISECTIONS = 40
 LEAST_MOVE_M = 1.0
 """Places that would move up by less are left alone."""
 
@@ -51,24 +44,27 @@ def plan_entry(
     speed_mps: float,
     rules: Rules,
 ) -> FloatArray:
-    """Returns the trajectory with which a vehicle enters now, of length 0 if it must wait."""
+    """Returns the trajectory with which a vehicle enters now, of length 0 if it must wait.
+
+    It brakes for the least whole number of steps that is safe.
+    """
     out = np.empty((MAX_PIECES, 4))
     stop_m = stop_behind_m(fleet, rules) if on_ramp else math.inf
-    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, 0.0, stop_m, rules)
-    if safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
-        return out[:n]
-    shortest_s, longest_s = 0.0, speed_mps / rules.motion.slow_down_mps2
-    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, longest_s, stop_m, rules)
-    if not safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
-        return out[:0]
-    for _ in range(BISECTIONS):
-        brake_s = 0.5 * (shortest_s + longest_s)
-        n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, brake_s, stop_m, rules)
+    step_s = rules.control.step_s
+    most = math.ceil(speed_mps / rules.motion.slow_down_mps2 / step_s)
+    too_short, enough, steps = -1, most + 1, 0
+    while enough - too_short > 1:
+        n = entry_with_brake(
+            out, on_ramp, time_s, station_m, speed_mps, steps * step_s, stop_m, rules
+        )
         if safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
-            longest_s = brake_s
+            enough = steps
+        elif steps == most:
+            return out[:0]
         else:
-            shortest_s = brake_s
-    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, longest_s, stop_m, rules)
+            too_short = steps
+        steps = most if enough > most else (too_short + enough) // 2
+    n = entry_with_brake(out, on_ramp, time_s, station_m, speed_mps, enough * step_s, stop_m, rules)
     return out[:n]
 
 
@@ -96,7 +92,7 @@ def entry_with_brake(
         rules.motion,
     )
     if on_ramp:
-        return append_stop(out, n, stop_m, rules.motion.comfort_mps2)
+        return append_stop(out, n, stop_m, rules.motion.stop_mps2)
     return n
 
 
@@ -104,18 +100,12 @@ def entry_with_brake(
 def stop_behind_m(fleet: Fleet, rules: Rules) -> float:
     """Returns where the next ramp vehicle must be able to stop: before the nose, or another."""
     stop_m = rules.road.stop_station_m
-    standing_m = safe_distance_m(0.0, 0.0, rules.safety) + rules.safety.execution_allowance_m
+    standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
     for row in fleet.live:
         if fleet.merge_time_s[row] == math.inf:
             behind_m = stop_of_m(committed(fleet, row)) - fleet.length_m[row] - standing_m
             stop_m = min(stop_m, behind_m)
     return stop_m
-
-
-@kernel
-def stop_of_m(pieces: FloatArray) -> float:
-    """Returns the station (m) at which a trajectory that ends in a stand does so."""
-    return float(pieces[len(pieces) - 1, STATION])
 
 
 @kernel
@@ -127,26 +117,14 @@ def plan_moving_up(fleet: Fleet, from_s: float, rules: Rules) -> Proposal:
     """
     proposal = empty_proposal()
     rows = undecided_in_lane_order(fleet, from_s)
-    standing_m = safe_distance_m(0.0, 0.0, rules.safety) + rules.safety.execution_allowance_m
+    standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
     place_m = rules.road.stop_station_m
     for k in range(len(rows)):
-        row, entry = rows[k], proposal.size[0]
-        if entry == MAX_CHANGED:
-            break
-        before = committed(fleet, row)
-        if place_m > stop_of_m(before) + LEAST_MOVE_M:
-            out = proposal.pieces[entry]
-            n = approach_without_stop(before, from_s, rules.road, rules.motion, out)
-            n = append_stop(out, n, place_m, rules.motion.comfort_mps2)
-            if n > 0 and (
-                k == 0 or _follows_safely(fleet, proposal, rows[k - 1], row, out[:n], from_s, rules)
-            ):
-                proposal.rows[entry] = row
-                proposal.piece_count[entry] = n
-                proposal.merge_time_s[entry] = math.inf
-                proposal.size[0] = entry + 1
-        after = trajectory_under(fleet, proposal, row)
-        place_m = min(place_m, stop_of_m(after) - fleet.length_m[row] - standing_m)
+        row = rows[k]
+        if place_m > stop_of_m(committed(fleet, row)) + LEAST_MOVE_M:
+            propose_place_ahead(fleet, proposal, row, place_m, from_s, rules)
+        stop_m = stop_of_m(trajectory_under(fleet, proposal, row))
+        place_m = min(place_m, stop_m - fleet.length_m[row] - standing_m)
     return proposal
 
 
@@ -166,29 +144,6 @@ def undecided_in_lane_order(fleet: Fleet, time_s: float) -> IntArray:
             stations_m[k], rows[k] = station_m, row
             n += 1
     return rows[:n]
-
-
-@kernel
-def _follows_safely(
-    fleet: Fleet,
-    proposal: Proposal,
-    leader: int,
-    row: int,
-    pieces: FloatArray,
-    from_s: float,
-    rules: Rules,
-) -> bool:
-    margin_m = pair_margin_m(
-        trajectory_under(fleet, proposal, leader),
-        fleet.length_m[leader],
-        math.inf,
-        pieces,
-        fleet.length_m[row],
-        math.inf,
-        from_s,
-        rules,
-    )
-    return margin_m >= rules.safety.execution_allowance_m - ROUNDING_M
 
 
 @kernel

@@ -124,7 +124,7 @@ class Coordinator:
         self._admit(False, step)
         self._admit(True, step)
         while subjects := self._woken(step):
-            ready = tuple(row for row in subjects if not self._moves_up(row, step))
+            ready = tuple(row for row in subjects if not self._goes_on_to_station(row, step))
             if ready:
                 self._decide(ready, step)
 
@@ -200,13 +200,18 @@ class Coordinator:
         self._due_step[row] = max(step, self._first_step_from(due_s))
         self._wake(self._due_step[row], row)
 
+    def _goes_on_to_station(self, row: int, step: int) -> bool:
+        """Whether a vehicle whose stop lay before its decision station can now go on towards it."""
+        station_m, _ = station_and_speed(self.ledger.trajectory(row), step * self._step_s)
+        if station_m >= self._rules.road.decision_station_m or not self._moves_up(row, step):
+            return False
+        self._plan_when_due(row, self.ledger.trajectory(row), step + 1)
+        return True
+
     def _moves_up(self, row: int, step: int) -> bool:
-        """Whether a vehicle that its stop keeps from its decision station can go on towards it."""
+        """Whether a vehicle without a merge can go on to a stop further ahead, and now does."""
         time_s = step * self._step_s
-        station_m, _ = station_and_speed(self.ledger.trajectory(row), time_s)
-        if self.ledger.merge_time_s(row) < math.inf or (
-            station_m >= self._rules.road.decision_station_m
-        ):
+        if self.ledger.merge_time_s(row) < math.inf:
             return False
         from_s = time_s + self._rules.control.actuation_delay_s
         proposal = plan_moving_up(self.ledger.fleet, from_s, self._rules)
@@ -224,7 +229,6 @@ class Coordinator:
             return False
         for move in moves:
             self._commit(move.row, move.pieces, move.merge_time_s, step)
-        self._plan_when_due(row, self.ledger.trajectory(row), step + 1)
         return True
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
@@ -253,7 +257,10 @@ class Coordinator:
         self._memory = decision.memory
         self._record(decision, trajectories, time_s, margin_m)
         for wake_s, row in decision.wakes_s:
-            self._wake(self._first_step_from(wake_s), row)
+            wake_step = self._first_step_from(wake_s)
+            self._wake(wake_step, row)
+            if wake_step > step:
+                self._moves_up(row, step)
 
     def _refuse(self, subjects: tuple[int, ...], step: int, reason: str) -> None:
         retry_step = self._first_step_from(step * self._step_s + self._rules.control.retry_s)

@@ -93,6 +93,12 @@ def stop_starts_s(pieces: FloatArray) -> float:
 
 
 @kernel
+def stop_of_m(pieces: FloatArray) -> float:
+    """Returns the station (m) at which a trajectory that ends in a stand does so."""
+    return float(pieces[len(pieces) - 1, STATION])
+
+
+@kernel
 def approach_without_stop(
     pieces: FloatArray, from_s: float, road: Road, motion: MotionLimits, out: FloatArray
 ) -> int:

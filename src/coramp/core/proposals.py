@@ -3,7 +3,6 @@
 import math
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.approach import append_stop, harmonise
 from coramp.core.fleet import (
     MAX_CHANGED,
     ROUNDING_M,
@@ -31,7 +30,6 @@ from coramp.core.trajectory import (
     intercept_range_m,
     largest_acceleration_mps2,
     speed_range_mps,
-    station_and_speed,
     superpose_shift,
 )
 
@@ -181,74 +179,6 @@ def push_back(
         )
         shift_m = cascade_shift_m(shift_m, distance_m - clearance_m, 0.0, 0.0)
         k += 1
-    return True
-
-
-@kernel
-def propose_later_stop(
-    fleet: Fleet,
-    proposal: Proposal,
-    row: int,
-    leader: int,
-    from_s: float,
-    rules: Rules,
-) -> bool:
-    """Adds a ramp vehicle that brakes just long enough to stay behind a leader that slows down.
-
-    It keeps its stop before the nose. Returns False where no braking is enough.
-    """
-    entry = proposal.size[0]
-    if entry >= MAX_CHANGED:
-        return False
-    before = committed(fleet, row)
-    station_m, speed_mps = station_and_speed(before, from_s)
-    stop_m = before[len(before) - 1, STATION]
-    ahead = trajectory_under(fleet, proposal, leader)
-    ahead_merge_s = merge_time_under_s(fleet, proposal, leader)
-    out = proposal.pieces[entry]
-    shortest_s, longest_s = 0.0, speed_mps / rules.motion.slow_down_mps2
-    safe_n = 0
-    for _ in range(40):
-        brake_s = longest_s if safe_n == 0 else 0.5 * (shortest_s + longest_s)
-        n = harmonise(
-            out,
-            from_s,
-            station_m,
-            speed_mps,
-            0.0,
-            brake_s,
-            rules.road.ramp_speed_mps,
-            rules.motion,
-        )
-        n = append_stop(out, n, stop_m, rules.motion.comfort_mps2)
-        safe = n > 0 and (
-            pair_margin_m(
-                ahead,
-                fleet.length_m[leader],
-                ahead_merge_s,
-                out[:n],
-                fleet.length_m[row],
-                math.inf,
-                from_s,
-                rules,
-            )
-            >= rules.safety.execution_allowance_m - ROUNDING_M
-        )
-        if safe:
-            longest_s = brake_s
-            safe_n = n
-        elif safe_n == 0:
-            return False
-        else:
-            shortest_s = brake_s
-    n = harmonise(
-        out, from_s, station_m, speed_mps, 0.0, longest_s, rules.road.ramp_speed_mps, rules.motion
-    )
-    n = append_stop(out, n, stop_m, rules.motion.comfort_mps2)
-    proposal.rows[entry] = row
-    proposal.piece_count[entry] = n
-    proposal.merge_time_s[entry] = math.inf
-    proposal.size[0] = entry + 1
     return True
 
 

@@ -44,14 +44,16 @@ class MotionLimits(NamedTuple):
     """Accelerations in m/s2, all positive, and how far speed may leave v0 while a gap is made.
 
     ``speed_up_mps2`` and ``slow_down_mps2`` bring vehicles to the common speed of their lane.
-    ``comfort_mps2`` (0.3 g) binds everyone, and stops before the nose, but for a ramp vehicle that
-    speeds up, which is bound by ``ramp_acceleration_mps2`` (6). ``free_acceleration_mps2`` is that
+    ``comfort_mps2`` (0.3 g) binds everyone but a ramp vehicle that speeds up, which is bound by
+    ``ramp_acceleration_mps2`` (6). ``stop_mps2`` is the braking towards a stop before the nose.
+    ``free_acceleration_mps2`` is that
     of free movement (Eq. 12). ``speed_deviation`` is a fraction of v0.
     """
 
     speed_up_mps2: float
     slow_down_mps2: float
     comfort_mps2: float
+    stop_mps2: float
     ramp_acceleration_mps2: float
     free_acceleration_mps2: float
     speed_deviation: float

@@ -109,3 +109,21 @@ def following_clearance_m(road: Road, safety: SafetyBudget) -> float:
     """Returns the bumper distance (m) planned between two vehicles that cruise at v0."""
     speed_mps = road.mainline_speed_mps
     return safe_distance_m(speed_mps, speed_mps, safety) + safety.execution_allowance_m
+
+
+@kernel
+def standing_clearance_m(road: Road, safety: SafetyBudget, stop_mps2: float) -> float:
+    """Returns the bumper distance (m) planned between two vehicles that stop one behind the other.
+
+    Eq. 1 at a stand, plus what a time gap and the clock error ask for on the way. Per m/s these are
+    ``T = time_gap + 2 clock_error`` at most. At speed v the follower is ``v^2 / (2 d)`` before its
+    stop and must keep ``v^2 / (2 g (phi + psi)) + T v`` from the vehicle that stands, so its stop
+    lies by the largest ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
+    """
+    still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
+    per_speed_s = safety.time_gap_s + 2.0 * safety.clock_error_s
+    spare_per_square = 0.5 / stop_mps2 - braking_distance_m(1.0, safety.adhesion, safety.resistance)
+    speed_mps = road.ramp_limit_mps
+    if spare_per_square > 0.0:
+        speed_mps = min(speed_mps, 0.5 * per_speed_s / spare_per_square)
+    return still_m + speed_mps * (per_speed_s - spare_per_square * speed_mps)

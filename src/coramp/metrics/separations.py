@@ -35,13 +35,12 @@ class LaneUse(NamedTuple):
     """Who uses a lane when. Vehicle i drives ``rows[first[i] : first[i + 1]]``.
 
     It is in the lane from ``from_s[i]`` (nan: never) to ``until_s[i]``, and came by a lane change
-    if ``merges[i]``. ``error_m`` is its largest distance from plan.
+    if ``merges[i]``.
     """
 
     first: IntArray
     rows: FloatArray
     length_m: FloatArray
-    error_m: FloatArray
     from_s: FloatArray
     until_s: FloatArray
     merges: BoolArray
@@ -51,8 +50,8 @@ class LaneUse(NamedTuple):
 def lane_extremes(lane: LaneUse, merge_angle_rad: float, safety: SafetyBudget) -> FloatArray:
     """Returns min margin (m), min TTC (s), max DRAC (m/s2), max severity (m2/s4), violations.
 
-    Margins are over Eq. 1, for vehicles that merge over Eq. 15 and 16 at that moment, less the
-    plan errors of both. A violation is a pair of neighbours with a negative margin.
+    Margins are over Eq. 1, and for vehicles that merge over Eq. 15 and 16 at that moment. A
+    violation is a pair of neighbours with a negative margin.
     """
     extremes = np.array([math.inf, math.inf, 0.0, 0.0, 0.0])
     times_s, kinds, vehicles = lane_events(lane)
@@ -146,7 +145,7 @@ def _end_pair(
 ) -> None:
     ahead, behind = driven(lane, front), driven(lane, rear)
     margin_m, _ = smallest_margin_m(ahead, lane.length_m[front], behind, start_s, end_s, safety)
-    _note_margin(extremes, margin_m - lane.error_m[front] - lane.error_m[rear])
+    _note_margin(extremes, margin_m)
     ttc_s, drac_mps2 = closing_extremes(ahead, lane.length_m[front], behind, start_s, end_s)
     extremes[TTC] = min(extremes[TTC], ttc_s)
     extremes[DRAC] = max(extremes[DRAC], drac_mps2)
@@ -177,7 +176,7 @@ def _look_at_merge(
         distance_m = own_m - lane.length_m[merging] - other_m
     along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
     margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
-    if margin_m - lane.error_m[merging] - lane.error_m[other] < 0.0:
+    if margin_m < 0.0:
         extremes[VIOLATIONS] += 1.0
     severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)

@@ -137,7 +137,7 @@ def trajectories_table(outcome: Outcome) -> pl.DataFrame:
     return _frame(
         TRAJECTORIES,
         vehicle_id=[name for name, n in zip(names, counts, strict=True) for _ in range(n)],
-        lane=[LANES[code] for code in pieces.lane],
+        lane=[LANES[code] for code in outcome.lane],
         time_s=pieces.rows[:, 0],
         station_m=pieces.rows[:, 1],
         speed_mps=pieces.rows[:, 2],
@@ -210,21 +210,19 @@ def _stream_metrics(streams: list[Row]) -> Row:
 
 def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     """Returns how near vehicles came and how hard they braked; null where no two met."""
-    passages, pieces = outcome.passages, outcome.pieces
+    passages, driven = outcome.passages, outcome.driven
     rules = scenario.rules()
     until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
     until_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
-    error_m = np.nan_to_num(passages.plan_error_m)
     on_mainline_s = np.where(passages.on_ramp, passages.merge_s, passages.entry_s)
     off_ramp_s = np.where(np.isnan(passages.merge_s), until_s, passages.merge_s)
     on_ramp_s = np.where(passages.on_ramp, passages.entry_s, np.nan)
     extremes = []
     for from_s, to_s in ((on_mainline_s, until_s), (on_ramp_s, off_ramp_s)):
         lane = LaneUse(
-            pieces.first,
-            pieces.rows,
+            driven.first,
+            driven.rows,
             passages.length_m,
-            error_m,
             from_s,
             to_s,
             passages.on_ramp & (from_s is on_mainline_s),
@@ -238,7 +236,7 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
         "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
         "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
         "max_severity": float(mainline[SEVERITY]),
-        "max_decel_mps2": float(hardest_braking_mps2(pieces.rows)),
+        "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
         "plan_error_m": _largest(passages.plan_error_m),
     }
 

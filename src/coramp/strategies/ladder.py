@@ -6,6 +6,7 @@ from collections.abc import Callable
 from coramp._kernel import FloatArray, kernel
 from coramp.core.conflict_risk import conflict_severity_m2ps4
 from coramp.core.fleet import Fleet, Proposal, committed, proposed, trajectory_under
+from coramp.core.ramp_queue import next_behind_on_ramp
 from coramp.core.rules import Rules
 from coramp.core.safe_distance import merging_speed_along_mps
 from coramp.core.trajectory import station_and_speed
@@ -119,22 +120,21 @@ def station_at_decision_m(situation: Situation, position: int, rules: Rules) -> 
 def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     """Returns the decision for the first of ``view.subjects``; the others are woken at once.
 
-    One at a time, since each plan rests on those before it. A vehicle whose leader on the ramp
-    still waits, or that no rung helps, keeps its stop and is woken again after ``retry_s``.
-    The memory is the set of rows that hold, so that a wait is explained once.
+    One at a time, since each plan rests on those before it. A vehicle that no rung helps keeps its
+    stop and is woken again after ``retry_s``. One whose leader on the ramp still waits is woken
+    when that gets its merge. The memory is the set of rows that wait, so that a wait is explained
+    once.
     """
     row = view.subjects[0]
     waiting = memory if isinstance(memory, frozenset) else frozenset()
     rest = tuple((view.time_s, other) for other in view.subjects[1:])
-    again = (*rest, (view.time_s + view.rules.control.retry_s, row))
     from_s = view.time_s + view.rules.control.actuation_delay_s
-    blocked = ramp_is_blocked(view.fleet, row, from_s)
-    if blocked and row in waiting:
-        return Decision(wakes_s=again, memory=waiting)
     plan, proposal = planner(view.fleet, row, view.time_s, view.fastest_entry_mps, view.rules)
+    blocked = ramp_is_blocked(view.fleet, row, from_s)
     if blocked or plan.rung == RUNG_HOLD:
+        again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
         reasons = () if row in waiting else (held(row, plan),)
-        return Decision((), again, waiting | {row}, reasons)
+        return Decision((), (*rest, *again), waiting | {row}, reasons)
     commands = tuple(
         FollowTrajectory(
             int(proposal.rows[k]),
@@ -144,7 +144,9 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
         )
         for k in range(int(proposal.size[0]))
     )
-    return Decision(commands, rest, waiting - {row}, (explanation(row, plan),))
+    behind = next_behind_on_ramp(view.fleet, row, from_s)
+    follow_up = ((view.time_s, behind),) if behind in waiting else ()
+    return Decision(commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan),))
 
 
 def explanation(row: int, plan: MergePlan) -> Explanation:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import kernel
-from coramp.core.approach import late_approach
+from coramp.core.approach import late_approach, stop_of_m
 from coramp.core.fleet import (
     ROUNDING_M,
     Fleet,
@@ -22,12 +22,12 @@ from coramp.core.fleet import (
 )
 from coramp.core.proposals import (
     find_unsafe_pair,
-    propose_later_stop,
     propose_merge,
     push_ahead,
     push_back,
 )
 from coramp.core.ramp_acceleration import acceleration_for_lag_mps2, lag_m
+from coramp.core.ramp_queue import next_behind_on_ramp, propose_stop
 from coramp.core.rules import Rules
 from coramp.core.trajectory import MAX_PIECES, station_and_speed
 from coramp.strategies.situation import (
@@ -242,7 +242,7 @@ def delay_followers(fleet: Fleet, proposal: Proposal, situation: Situation, rule
     """Adds those behind the subject on the ramp that would come too near to who is before them."""
     leader = situation.subject
     while True:
-        follower = next_on_ramp(fleet, leader, situation.from_s)
+        follower = next_behind_on_ramp(fleet, leader, situation.from_s)
         if follower < 0:
             return True
         entry = entry_of(proposal, leader)
@@ -258,20 +258,7 @@ def delay_followers(fleet: Fleet, proposal: Proposal, situation: Situation, rule
         )
         if margin_m >= rules.safety.execution_allowance_m - ROUNDING_M:
             return True
-        if not propose_later_stop(fleet, proposal, follower, leader, situation.from_s, rules):
+        stop_m = stop_of_m(committed(fleet, follower))
+        if not propose_stop(fleet, proposal, follower, stop_m, situation.from_s, rules):
             return False
         leader = follower
-
-
-@kernel
-def next_on_ramp(fleet: Fleet, leader: int, from_s: float) -> int:
-    """Returns the next ramp vehicle behind ``leader`` without a committed merge, or -1."""
-    leader_m, _ = station_and_speed(committed(fleet, leader), from_s)
-    found = -1
-    found_m = -math.inf
-    for row in fleet.live:
-        if row != leader and fleet.merge_time_s[row] == math.inf:
-            row_m, _ = station_and_speed(committed(fleet, row), from_s)
-            if found_m < row_m < leader_m:
-                found, found_m = row, row_m
-    return found

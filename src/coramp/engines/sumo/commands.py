@@ -12,29 +12,30 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_at, piece_end_s, station_and_speed
+from coramp.core.trajectory import ACCEL, SPEED, piece_at, piece_end_s, station_and_speed
 
 ON_GRID = 1e-6
 """Share of a step within which a knot counts as lying on it."""
 
 
 @kernel
-def command_table(pieces: FloatArray, step_s: float) -> FloatArray:
-    """Returns the commands that drive a trajectory, shape (n, 4): step, speed, steps, station.
+def command_table(pieces: FloatArray, step_s: float, from_step: int) -> FloatArray:
+    """Returns the commands that drive a trajectory, shape (n, 5), by step.
+
+    Columns are step, speed, steps, and where and how fast the plan has the vehicle at that step.
 
     At ``step`` go to ``speed`` (m/s) evenly over ``steps``; 0 steps means to keep it from now on.
-    ``station`` (m) is where the plan has the vehicle at ``step``. The trajectory must start on a
-    step and end in a cruise or at a stand.
+    The first command is for ``from_step``. The trajectory must end in a cruise or at a stand.
     """
-    out = np.empty((4 * len(pieces) + 4, 4))
+    out = np.empty((4 * len(pieces) + 4, 5))
     n = 0
-    step = round(pieces[0, TIME] / step_s)
+    step = from_step
     last = len(pieces) - 1
     while True:
         now_s = step * step_s
         k = piece_at(pieces, now_s + ON_GRID * step_s)
-        station_m, _ = station_and_speed(pieces, now_s)
-        out[n, 0], out[n, 3] = step, station_m
+        out[n, 0] = step
+        out[n, 3], out[n, 4] = station_and_speed(pieces, now_s)
         if k == last:
             out[n, 1], out[n, 2] = pieces[last, SPEED], 0
             return out[: n + 1]
@@ -44,3 +45,32 @@ def command_table(pieces: FloatArray, step_s: float) -> FloatArray:
         out[n, 2] = 0 if whole >= 1 and pieces[k, ACCEL] == 0.0 else steps
         n += 1
         step += steps
+
+
+@kernel
+def correction(
+    pieces: FloatArray, step_s: float, step: int, error_m: float, speed_mps: float, most_steps: int
+) -> FloatArray:
+    """Returns two commands that bring a vehicle back onto its plan, none if a knot is too near.
+
+    At ``step`` it drives ``speed_mps`` and is ``error_m`` ahead. Both commands take h steps, at
+    most ``most_steps``, within one piece. With u the speed between them the way is
+    ``h step_s (v / 2 + u + w / 2)``, w the plan's speed at the end.
+    """
+    out = np.empty((2, 5))
+    k = piece_at(pieces, (step + ON_GRID) * step_s)
+    left = most_steps * 2.0
+    if k + 1 < len(pieces):
+        left = min(left, math.floor(piece_end_s(pieces, k) / step_s + ON_GRID) - step)
+    h = int(left) // 2
+    if h < 1:
+        return out[:0]
+    now_m, now_mps = station_and_speed(pieces, step * step_s)
+    middle_m, middle_mps = station_and_speed(pieces, (step + h) * step_s)
+    then_m, then_mps = station_and_speed(pieces, (step + 2 * h) * step_s)
+    between_mps = (then_m - now_m - error_m) / (h * step_s) - 0.5 * (speed_mps + then_mps)
+    if between_mps < 0.0:
+        return out[:0]
+    out[0] = np.array((float(step), between_mps, float(h), now_m, now_mps))
+    out[1] = np.array((float(step + h), then_mps, float(h), middle_m, middle_mps))
+    return out

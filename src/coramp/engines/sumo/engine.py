@@ -124,13 +124,24 @@ def _cooperative_outcome(
     return Outcome(
         cooperative=True,
         passages=_passages(arrivals, step_s, entry_s, merge_s, exit_s, error_m),
-        pieces=Pieces(first, lane, rows),
+        pieces=Pieces(first, rows),
+        lane=lane,
+        driven=_driven(plant, vehicle_of_row, len(arrivals)),
         end_s=end_s,
         collisions=collisions,
         decisions=tuple(coordinator.decisions),
         refusals=tuple(coordinator.refusals),
         vehicle_of_row=vehicle_of_row,
     )
+
+
+def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) -> Pieces:
+    """What vehicles drove in SUMO: from each command and where it met them, by vehicle and time."""
+    rows = np.array(plant.driven, dtype=np.float64).reshape(-1, 5)
+    vehicle = vehicle_of_row[rows[:, 0].astype(np.int64)]
+    order = np.argsort(vehicle, kind="stable")
+    first = np.searchsorted(vehicle[order], np.arange(vehicles + 1)).astype(np.int64)
+    return Pieces(first, np.ascontiguousarray(rows[order, 1:]))
 
 
 def _passages(
@@ -184,7 +195,9 @@ def run_uncontrolled(
     return Outcome(
         cooperative=False,
         passages=_passages(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
-        pieces=Pieces(first, np.where(samples.on_mainline, MAINLINE, RAMP), rows),
+        pieces=Pieces(first, rows),
+        lane=np.where(samples.on_mainline, MAINLINE, RAMP),
+        driven=Pieces(first, rows),
         end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
         collisions=collisions,
     )
