@@ -22,6 +22,12 @@ OBEY = 32
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
 FASTEST_COMMAND_MPS = 100.0
+ACTION_S = 1.0
+"""How often SUMO lets a vehicle that was taken over look around.
+
+In between it keeps its acceleration, which is what its pieces ask for; each command makes it act
+at once. That more than halves the time of a simulation step.
+"""
 
 
 class Session:
@@ -84,6 +90,7 @@ class Session:
         """Commands a speed from now on."""
         _check_speed(vehicle_id, speed_mps)
         libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
+        self._act_now(vehicle_id)
 
     def change_speed(self, vehicle_id: str, speed_mps: float, steps: int) -> None:
         """Commands an even change to a speed over a number of steps."""
@@ -91,10 +98,15 @@ class Session:
         if steps < 1:
             raise CorampError(f"SUMO: {vehicle_id}: cannot change speed over {steps} steps")
         libsumo.vehicle.slowDown(vehicle_id, speed_mps, steps * self._step_s)
+        self._act_now(vehicle_id)
 
     def change_lane(self, vehicle_id: str, lane: int) -> None:
         """Commands a lane change at the end of the next step."""
         libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
+        self._act_now(vehicle_id)
+
+    def _act_now(self, vehicle_id: str) -> None:
+        libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
 
     def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
         """Returns the lane that the vehicle's front is on, and its position along it (m).
