@@ -148,8 +148,14 @@ def print_plan(result: PlanResult) -> None:
         print(f"{vehicle_id}: {told(decision)}.")
         title = f"{vehicle_id}, rung {decision['rung']}"
         print_table(quantity_table(title, result.quantities(vehicle_id)))
-        margin = number(decision["min_margin_m"], 3)
-        print(f"Checked: everyone affected keeps {margin} m or more beyond the safe distance.\n")
+        print(f"{_checked(decision['min_margin_m'])}\n")
+
+
+def _checked(margin_m: float | None) -> str:
+    if margin_m is None:
+        return "Nothing new to check: every commitment stays as it was."
+    margin = number(margin_m, 3)
+    return f"Checked: everyone affected keeps {margin} m or more beyond the safe distance."
 
 
 def plan_json(result: PlanResult) -> Row:

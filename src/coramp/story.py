@@ -85,10 +85,10 @@ def told(decision: dict[str, Any]) -> str:
         case "reach":
             how = f"an acceleration of {decision['accel_mps2']:.3f} m/s2 reaches a gap: it merges"
         case "create":
-            how = f"a gap is made (scenario {decision['scenario']}; {moved} moves): it merges"
+            how = f"a gap is made (scenario {decision['scenario']}, moving {moved}): it merges"
         case "delay":
             how = "it slows down on the ramp for a later gap and merges"
-            how += f" ({moved} brakes behind it)" if moved else ""
+            how += f" (braking behind it: {moved})" if moved else ""
         case _:
             return "no merge is safe yet: it keeps its stop before the nose and is planned again"
     return (

@@ -50,8 +50,8 @@ class LaneUse(NamedTuple):
 def lane_extremes(lane: LaneUse, merge_angle_rad: float, safety: SafetyBudget) -> FloatArray:
     """Returns min margin (m), min TTC (s), max DRAC (m/s2), max severity (m2/s4), violations.
 
-    Margins are over Eq. 1, and for vehicles that merge over Eq. 15 and 16 at that moment. A
-    violation is a pair of neighbours with a negative margin.
+    The margin is over Eq. 1. A violation is a pair of neighbours that come nearer than that, or at
+    a lane change nearer than Eq. 15 or 16.
     """
     extremes = np.array([math.inf, math.inf, 0.0, 0.0, 0.0])
     times_s, kinds, vehicles = lane_events(lane)

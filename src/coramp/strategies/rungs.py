@@ -182,6 +182,8 @@ def create(
         intercept_m = min(high_m, situation.highest_m)
     else:
         intercept_m = min(max(0.5 * (low_m + high_m), situation.lowest_m), situation.highest_m)
+        if not high_m < intercept_m < low_m:  # only one of them would move
+            return no_merge()
     if intercept_m < situation.lowest_m or intercept_m > situation.highest_m:
         return no_merge()
     if intercept_m < unknown_bound_m(fleet, situation):

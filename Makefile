@@ -1,0 +1,48 @@
+# make demo | test | lint | bench | clean; everything lives in .venv of this checkout.
+SHELL := /bin/sh
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/installed
+
+# The first Python from 3.11 on that can make environments; override with make PYTHON=...
+USABLE := import ensurepip, sys; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
+	$$p -c '$(USABLE)' >/dev/null 2>&1 && echo $$p && break; done)
+
+.PHONY: help demo test lint bench clean
+
+help:
+	@echo "make demo   install, run the paper's study with three seeds, print its tables"
+	@echo "make test   run all tests"
+	@echo "make lint   check style, types and layers"
+	@echo "make bench  measure speed, as ratios"
+	@echo "make clean  remove the environment and all results under out/"
+
+$(INSTALLED): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "Error: no Python 3.11 or newer with venv found; make PYTHON=/path/to/python"; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt hatchling editables
+	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
+	@echo "Compiling the kernels, once (about a minute) ..."
+	@$(BIN)/coramp run paper --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
+	@$(BIN)/coramp run paper --strategy ramp-priority --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
+	@touch $(INSTALLED)
+
+demo: $(INSTALLED)
+	$(BIN)/coramp study paper --out out/demo
+
+test: $(INSTALLED)
+	$(BIN)/pytest -n auto --dist loadfile
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(INSTALLED)
+	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds --benchmark-sort=fullname -s
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
+	find src tests benchmarks -name __pycache__ -type d -exec rm -rf {} +

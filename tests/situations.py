@@ -1,0 +1,110 @@
+"""Random traffic for properties, and the loop run over it without any simulator."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import strategies as st
+
+from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.driven import driven_pieces
+from coramp.coordination.plant import Arrival
+from coramp.errors import CorampError
+from coramp.loading import load_scenario
+from coramp.strategies.registry import strategies, strategy_named
+from tests.nowhere import Nowhere
+
+STEP_S = 0.1
+COOPERATIVE = [name for name, s in strategies().items() if s.cooperative]
+
+OVERRIDES = {
+    "safety.time_gap_s": [0.0, 0.0, 0.6, 1.4],
+    "safety.positioning_error_m": [0.02, 0.5],
+    "safety.clock_error_s": [3e-9, 0.01],
+    "safety.adhesion": [0.4, 0.1],
+    "ramp.acceleration_lane_m": [200.0, 120.0],
+    "ramp.decision_station_m": [-200.0, -280.0, -60.0],
+    "control.gap_position": ["nearest", "front"],
+    "control.gap_creation_start": ["decision", "nose"],
+    "control.actuation_delay_s": [0.1, 0.5, 0.0],
+    "motion.speed_deviation": [0.1, 0.0],
+}
+
+
+@st.composite
+def scenarios(draw):
+    """A valid variant of a built-in scenario."""
+    chosen = {key: draw(st.sampled_from(values)) for key, values in OVERRIDES.items()}
+    try:
+        return load_scenario(draw(st.sampled_from(["paper", "expressway"])), chosen)
+    except CorampError:
+        return load_scenario("paper")
+
+
+def _stream(draw, road, on_ramp, most):
+    low, high = road.entry_speed_mps
+    gaps = draw(st.lists(st.integers(6, 50), min_size=1, max_size=most))
+    return [
+        Arrival("", on_ramp, step, draw(st.floats(low, high)), draw(st.sampled_from([5.0, 12.0])))
+        for step in np.cumsum(gaps).tolist()
+    ]
+
+
+@st.composite
+def traffic(draw, scenario):
+    """Arrivals on both streams, dense enough that nearly everyone meets somebody."""
+    arrivals = _stream(draw, scenario.mainline, False, 30) + _stream(draw, scenario.ramp, True, 15)
+    return named(arrivals)
+
+
+def named(arrivals):
+    """Arrivals by time, named as a run names them."""
+    numbers, result = [0, 0], []
+    for a in sorted(arrivals, key=lambda a: (a.step, a.on_ramp)):
+        numbers[a.on_ramp] += 1
+        name = f"{'r' if a.on_ramp else 'm'}{numbers[a.on_ramp]:05d}"
+        result.append(Arrival(name, a.on_ramp, a.step, a.speed_mps, a.length_m))
+    return result
+
+
+@st.composite
+def situations(draw):
+    """A scenario with traffic, and a strategy that plans."""
+    scenario = draw(scenarios())
+    return scenario, draw(traffic(scenario)), draw(st.sampled_from(COOPERATIVE))
+
+
+def loop(scenario, arrivals, strategy, last_s=400.0):
+    """Returns the coordinator after it has handled everyone; ``strategy`` may be an object."""
+    if isinstance(strategy, str):
+        strategy = strategy_named(strategy)()
+    coordinator = Coordinator(
+        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps, Nowhere()
+    )
+    coordinator.expect_arrivals()
+    coordinator.run(round(last_s / STEP_S))
+    return coordinator
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What one vehicle drove: pieces, lane codes, and when it was gone."""
+
+    pieces: np.ndarray
+    lanes: np.ndarray
+    until_s: float
+    length_m: float
+
+
+def driven(coordinator, arrivals, end_s=400.0):
+    """Returns what everyone drove, by the row in which he entered."""
+    rows = np.arange(len(coordinator.entries))
+    first, lanes, pieces = driven_pieces(coordinator.ledger, rows, len(rows), end_s)
+    return [
+        Driven(
+            pieces[first[k] : first[k + 1]],
+            lanes[first[k] : first[k + 1]],
+            min(end_s, coordinator.ledger.exit_time_s(k)),
+            arrivals[coordinator.entries[k].arrival].length_m,
+        )
+        for k in rows
+    ]
