@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
-from coramp.coordination.plant import Arrival
+from coramp.coordination.plant import Arrival, Nowhere
 from coramp.errors import CorampError
 from coramp.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
-from tests.nowhere import Nowhere
 
 STEP_S = 0.1
 COOPERATIVE = [name for name, s in strategies().items() if s.cooperative]

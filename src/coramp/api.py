@@ -162,6 +162,9 @@ def run(
         seed=seed,
         horizon_s=horizon_s,
     )
+    if engine != "sumo" and (keep_sumo or gui):
+        option = "--keep-sumo" if keep_sumo else "--gui"
+        raise CorampError(f"{option}: the {engine} engine runs without SUMO; use --engine sumo")
     if out is None:
         if keep_sumo:
             raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")

@@ -89,7 +89,7 @@ def plan(
 def run(
     scenario: Annotated[str, typer.Argument(help="A built-in scenario or a TOML file.")],
     strategy: StrategyName = "mainline-priority",
-    engine: Annotated[str, typer.Option(help="What moves the vehicles: sumo.")] = "sumo",
+    engine: Annotated[str, typer.Option(help="What moves the vehicles: sumo or exact.")] = "sumo",
     mainline: Annotated[float | None, typer.Option(help="Mainline flow in veh/h.")] = None,
     ramp: Annotated[float | None, typer.Option(help="Ramp flow in veh/h.")] = None,
     drivers: Annotated[
@@ -111,7 +111,7 @@ def run(
     from coramp.console import print_json, print_run, working
     from coramp.toml_files import parse_overrides
 
-    with working("running in SUMO"):
+    with working("running"):
         result = run_scenario(
             scenario,
             strategy,

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from coramp._kernel import FloatArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
-from coramp.coordination.plant import Arrival
+from coramp.coordination.plant import Arrival, Nowhere
 from coramp.errors import CorampError
 from coramp.metrics.schemas import TRAJECTORIES
 from coramp.metrics.tables import decisions_table
@@ -31,19 +30,6 @@ class PlannedSnapshot:
     after: pl.DataFrame
 
 
-class _Nowhere:
-    """A plant that carries nobody."""
-
-    def advance(self, step: int) -> None:
-        """Does nothing."""
-
-    def enter(self, row: int, arrival: Arrival, step: int) -> None:
-        """Does nothing."""
-
-    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
-        """Does nothing."""
-
-
 def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
     """Returns the decisions of a strategy on a snapshot, at time 0.
 
@@ -63,7 +49,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         scenario.rules(),
         arrivals,
         scenario.fastest_mainline_entry_mps,
-        _Nowhere(),
+        Nowhere(),
     )
     for number, vehicle in enumerate(vehicles):
         if not coordinator.place(number, vehicle.station_m, 0):

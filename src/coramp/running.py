@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from coramp.engines.exact.engine import run_exact
 from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
 from coramp.errors import CorampError
 from coramp.loading import drivers_checked, load_scenario
@@ -19,7 +20,7 @@ from coramp.metrics.tables import Row, RunTables, tables_of
 from coramp.scenario import Scenario
 from coramp.strategies.registry import strategy_named
 
-ENGINES = ("sumo",)
+ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
 LARGEST_PLAN_ERROR_M = 0.05
 FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
@@ -87,6 +88,10 @@ def make_spec(
     chosen = strategy_named(strategy)
     if engine not in ENGINES:
         raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
+    if engine == "exact" and not chosen.cooperative:
+        raise CorampError(
+            f"engine: exact has no drivers for {strategy}; choose sumo, or a cooperative strategy"
+        )
     if not 0 <= seed < 2**31:
         raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
     settings = dict(overrides or {})
@@ -129,7 +134,9 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     options = options or SumoOptions()
     started = time.perf_counter()
     strategy = strategy_named(spec.strategy)()
-    if strategy.cooperative:
+    if spec.engine == "exact":
+        outcome = run_exact(spec.scenario, strategy, spec.seed)
+    elif strategy.cooperative:
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:
         drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]

@@ -6,14 +6,13 @@ import pytest
 
 import coramp
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.plant import Arrival
+from coramp.coordination.plant import Arrival, Nowhere
 from coramp.core.fleet import empty_proposal
 from coramp.scenario import Scenario
 from coramp.snapshots import Snapshot, load_snapshot
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.rungs import create, delay, merge_freely, reach
 from coramp.strategies.situation import assess
-from tests.nowhere import Nowhere
 from tests.outside import POSITION_ROUNDING_M, examine
 
 FOLDER = Path(__file__).parents[1] / "manoeuvres"

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 
 from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.plant import Nowhere
 from coramp.errors import CorampError
 from coramp.strategies.base import Decision, FollowTrajectory, ReleaseToDriver
 from coramp.strategies.registry import register, strategies, strategy_named
-from tests.nowhere import Nowhere
 from tests.situations import situations
 
 NAMES = list(strategies())

@@ -14,15 +14,22 @@ import polars as pl
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.driven import MAINLINE, RAMP, driven_pieces
+from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
+from coramp.engines.outcomes import (
+    cap_step_of,
+    cooperative_outcome,
+    passages_of,
+    step_after_last_exit,
+    vehicle_of_each_row,
+)
 from coramp.engines.sumo.cooperative import CooperativePlant
 from coramp.engines.sumo.demand import cooperative_routes, driver_routes
 from coramp.engines.sumo.network import RoadPlan, network_file, road_plan
 from coramp.engines.sumo.session import Session
 from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
-from coramp.records import Outcome, Passages, Pieces
+from coramp.records import Outcome, Pieces
 from coramp.scenario import Drivers, Scenario
 from coramp.strategies.base import Strategy
 
@@ -74,10 +81,10 @@ def run_cooperative(
             coordinator = Coordinator(
                 strategy, rules, arrivals, scenario.fastest_mainline_entry_mps, plant
             )
-            cap_step = _cap_step(scenario)
+            cap_step = cap_step_of(scenario)
             coordinator.expect_arrivals()
             coordinator.run(cap_step)
-            end_step = min(cap_step, _step_after_last_exit(coordinator, rules.control.step_s))
+            end_step = min(cap_step, step_after_last_exit(coordinator, rules.control.step_s))
             plant.finish(end_step)
             if end_step < cap_step and session.vehicles_left():
                 raise CorampError("SUMO: vehicles are left although every plan has ended")
@@ -85,53 +92,14 @@ def run_cooperative(
             files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=True))
         files.keep()
         collisions = files.collisions()
-    return _cooperative_outcome(
-        coordinator, plant, arrivals, rules.control.step_s, end_step, collisions
-    )
-
-
-def _cap_step(scenario: Scenario) -> int:
-    simulation = scenario.simulation
-    return round((simulation.horizon_s + simulation.drain_s) / scenario.control.step_s)
-
-
-def _step_after_last_exit(coordinator: Coordinator, step_s: float) -> int:
-    ledger = coordinator.ledger
-    if coordinator.waiting():
-        return 1 << 60
-    last_s = max((ledger.exit_time_s(row) for row in range(len(ledger))), default=0.0)
-    return 1 << 60 if math.isinf(last_s) else math.ceil(last_s / step_s) + 2
-
-
-def _cooperative_outcome(
-    coordinator: Coordinator,
-    plant: CooperativePlant,
-    arrivals: Sequence[Arrival],
-    step_s: float,
-    end_step: int,
-    collisions: int,
-) -> Outcome:
-    ledger, end_s = coordinator.ledger, end_step * step_s
-    vehicle_of_row = np.array([entry.arrival for entry in coordinator.entries], np.int64)
-    entry_s, merge_s, exit_s, error_m = (np.full(len(arrivals), np.nan) for _ in range(4))
-    entry_s[vehicle_of_row] = [entry.step * step_s for entry in coordinator.entries]
-    merge_s[vehicle_of_row] = [ledger.merge_time_s(row) for row in range(len(ledger))]
-    exit_s[vehicle_of_row] = [ledger.exit_time_s(row) for row in range(len(ledger))]
-    error_m[vehicle_of_row] = [vehicle.largest_error_m for vehicle in plant.vehicles]
-    merge_s[merge_s > end_s] = np.nan
-    exit_s[exit_s > end_s] = np.nan
-    first, lane, rows = driven_pieces(ledger, vehicle_of_row, len(arrivals), end_s)
-    return Outcome(
-        cooperative=True,
-        passages=_passages(arrivals, step_s, entry_s, merge_s, exit_s, error_m),
-        pieces=Pieces(first, rows),
-        lane=lane,
-        driven=_driven(plant, vehicle_of_row, len(arrivals)),
-        end_s=end_s,
-        collisions=collisions,
-        decisions=tuple(coordinator.decisions),
-        refusals=tuple(coordinator.refusals),
-        vehicle_of_row=vehicle_of_row,
+    return cooperative_outcome(
+        coordinator,
+        arrivals,
+        rules.control.step_s,
+        end_step,
+        np.array([vehicle.largest_error_m for vehicle in plant.vehicles]),
+        _driven(plant, vehicle_of_each_row(coordinator), len(arrivals)),
+        collisions,
     )
 
 
@@ -144,26 +112,6 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
     return Pieces(first, np.ascontiguousarray(rows[order, 1:]))
 
 
-def _passages(
-    arrivals: Sequence[Arrival],
-    step_s: float,
-    entry_s: FloatArray,
-    merge_s: FloatArray,
-    exit_s: FloatArray,
-    plan_error_m: FloatArray,
-) -> Passages:
-    return Passages(
-        tuple(arrival.vehicle_id for arrival in arrivals),
-        np.array([arrival.on_ramp for arrival in arrivals], np.bool_),
-        np.array([arrival.length_m for arrival in arrivals]),
-        np.array([arrival.step * step_s for arrival in arrivals]),
-        entry_s,
-        merge_s,
-        exit_s,
-        plan_error_m,
-    )
-
-
 def run_uncontrolled(
     scenario: Scenario, drivers: Drivers, seed: int, options: SumoOptions
 ) -> Outcome:
@@ -171,7 +119,7 @@ def run_uncontrolled(
     arrivals = arrivals_of(scenario, seed)
     ramp_limit_mps = scenario.ramp.speed_mps if drivers.wish == "free-flow" else None
     plan = road_plan(scenario, ramp_limit_mps)
-    step_s, cap_step = scenario.control.step_s, _cap_step(scenario)
+    step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
@@ -194,7 +142,7 @@ def run_uncontrolled(
     no_plan = np.full(len(arrivals), np.nan)
     return Outcome(
         cooperative=False,
-        passages=_passages(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
+        passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
         pieces=Pieces(first, rows),
         lane=np.where(samples.on_mainline, MAINLINE, RAMP),
         driven=Pieces(first, rows),

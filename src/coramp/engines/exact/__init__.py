@@ -1,0 +1,1 @@
+"""Commitments in closed form: no simulator and no time step."""
