@@ -96,14 +96,15 @@ class Driven:
 
 def driven(coordinator, arrivals, end_s=400.0):
     """Returns what everyone drove, by the row in which he entered."""
-    rows = np.arange(len(coordinator.entries))
+    of_row, _ = coordinator.entered()
+    rows = np.arange(len(of_row))
     first, lanes, pieces = driven_pieces(coordinator.ledger, rows, len(rows), end_s)
     return [
         Driven(
             pieces[first[k] : first[k + 1]],
             lanes[first[k] : first[k + 1]],
             min(end_s, coordinator.ledger.exit_time_s(k)),
-            arrivals[coordinator.entries[k].arrival].length_m,
+            arrivals[of_row[k]].length_m,
         )
         for k in rows
     ]

@@ -108,7 +108,7 @@ def test_accelerations_and_speeds_keep_their_bounds(situation):
         assert braking <= motion.comfort_mps2 + 1e-9
         assert vehicle.pieces[:, 3].max() <= motion.ramp_acceleration_mps2 + 1e-9
         assert vehicle.pieces[:, 2].min() >= -1e-9
-        entered_mps = arrivals[coordinator.entries[row].arrival].speed_mps
+        entered_mps = arrivals[coordinator.entered()[0][row]].speed_mps
         assert vehicle.pieces[:, 2].max() <= max(entered_mps, v0 * (1 + motion.speed_deviation)) + (
             1e-6
         )
@@ -129,11 +129,14 @@ def test_pieces_join_without_a_jump(situation):
 def before(coordinator, time_s, delay_s):
     """Everything decided before a time: who entered, what was decided and committed."""
     committed = [
-        (c.row, c.merge_time_s, coordinator.ledger.block(c).tolist())
+        (c.row, c.pieces.tolist())
         for c in coordinator.ledger.history
-        if coordinator.ledger.block(c)[0, 0] < time_s + delay_s - 1e-9
+        if c.pieces[0, 0] < time_s + delay_s - 1e-9
     ]
-    entered = [e for e in coordinator.entries if e.step * STEP_S < time_s - 1e-9]
+    who, when = coordinator.entered()
+    entered = [
+        (k, step) for k, step in zip(who, when, strict=True) if step * STEP_S < time_s - 1e-9
+    ]
     decided = [repr(d) for d in coordinator.decisions if d.time_s < time_s - 1e-9]
     return entered, decided, committed
 
@@ -197,7 +200,7 @@ def test_a_plan_that_the_checker_refuses_is_not_driven():
     assert {r.reason for r in coordinator.refusals} == {
         "comes nearer than Eq. 15 or 16 at the lane change"
     }
-    row = next(k for k, e in enumerate(coordinator.entries) if arrivals[e.arrival].on_ramp)
+    row = [arrivals[k].on_ramp for k in coordinator.entered()[0]].index(True)
     assert math.isinf(coordinator.ledger.merge_time_s(row))
     assert coordinator.ledger.trajectory(row)[-1, 2] == 0.0
 
@@ -214,10 +217,10 @@ def test_a_ramp_vehicle_always_holds_a_plan_that_ends_in_a_stop_or_a_merge(strat
     )
     arrivals = arrivals_of(scenario, 31)
     coordinator = loop(scenario, arrivals, strategy)
-    on_ramp = [arrivals[e.arrival].on_ramp for e in coordinator.entries]
+    on_ramp = [arrivals[k].on_ramp for k in coordinator.entered()[0]]
     stop_m = scenario.rules().road.stop_station_m
     for commitment in coordinator.ledger.history:
-        if on_ramp[commitment.row] and math.isinf(commitment.merge_time_s):
-            last = coordinator.ledger.block(commitment)[-1]
+        last = commitment.pieces[-1]
+        if on_ramp[commitment.row] and last[2] != scenario.mainline.speed_mps:
             assert last[2] == 0.0
             assert last[1] <= stop_m + 1e-9

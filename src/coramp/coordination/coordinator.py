@@ -5,21 +5,28 @@ Driven by the control clock alone. It knows no simulator: a plant carries the ve
 
 import heapq
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from coramp._kernel import FloatArray
+from coramp._kernel import FloatArray, IntArray
 from coramp.audit.checker import ACCEPTED, REASONS
 from coramp.coordination.admission import (
     decision_due_s,
-    plan_entry,
     plan_moving_up,
     undecided_in_lane_order,
 )
 from coramp.coordination.examination import Examiner, bounds_of
+from coramp.coordination.gate import (
+    DONE,
+    NEVER,
+    REFUSED,
+    WAITS,
+    admit_until,
+    enter,
+    first_step_from,
+    gate_for,
+    open_gate,
+)
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.plant import Arrival, Plant
 from coramp.core.fleet import proposed
@@ -33,9 +40,6 @@ from coramp.strategies.base import (
     Strategy,
     View,
 )
-
-ENTRY, WAKE = 0, 1
-NOBODY = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +61,6 @@ class Refusal:
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """At which step a row entered, and which arrival it is."""
-
-    arrival: int
-    step: int
-
-
 class Coordinator:
     """Runs one strategy over given arrivals."""
 
@@ -76,34 +72,74 @@ class Coordinator:
         fastest_entry_mps: float,
         plant: Plant,
     ) -> None:
-        self.ledger = Ledger(rules.road.mainline_speed_mps, rules.road.mainline_end_m)
-        self.entries: list[Entry] = []
+        road = rules.road
+        self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(arrivals))
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
         self._strategy = strategy
         self._rules = rules
         self._examiner = Examiner(bounds_of(rules))
         self._arrivals = arrivals
+        self._gate = gate_for(arrivals)
         self._fastest_entry_mps = fastest_entry_mps
         self._plant = plant
         self._memory: Memory = None
         self._step_s = rules.control.step_s
-        self._queues: tuple[deque[int], deque[int]] = (deque(), deque())
         self._due_step: dict[int, int] = {}
-        self._events: list[tuple[int, int, int]] = []
+        self._wakes: list[tuple[int, int]] = []
+        self._announced = 0
 
     def expect_arrivals(self) -> None:
         """Lets every arrival come at its step."""
-        self._events += [(arrival.step, ENTRY, k) for k, arrival in enumerate(self._arrivals)]
-        heapq.heapify(self._events)
+        open_gate(self._gate)
 
     def run(self, last_step: int) -> None:
         """Handles every event up to and including ``last_step``."""
-        while self._events and self._events[0][0] <= last_step:
-            step = self._events[0][0]
+        while True:
+            next_wake = self._wakes[0][0] if self._wakes else NEVER
+            self._admit(min(last_step, next_wake))
+            if not self._wakes or self._wakes[0][0] > last_step:
+                if min(self._gate.try_step) > last_step:
+                    return
+                continue
+            step = self._wakes[0][0]
             self._plant.advance(step)
             self.ledger.forget_exited(step * self._step_s)
-            self._handle(step)
+            self._handle_wakes(step)
+
+    def _admit(self, last_step: int) -> None:
+        """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
+        while True:
+            self.ledger.make_room()
+            stop = admit_until(
+                self.ledger.book, self._gate, last_step, self._rules, self._examiner.bounds
+            )
+            last_step = min(last_step, self._announce_entries())
+            if stop.why == REFUSED:
+                self._note_refusal(stop.step, len(self.ledger), stop.code)
+            elif stop.why == DONE:
+                return
+
+    def _announce_entries(self) -> int:
+        """Tells the plant who has entered; returns the first step at which one is planned."""
+        gate, first_due = self._gate, NEVER
+        for row in range(self._announced, len(self.ledger)):
+            step = int(gate.row_step[row])
+            self._plant.advance(step)
+            self._plant.enter(row, self._arrivals[gate.row_arrival[row]], step)
+            self._plant.follow(row, self.ledger.trajectory(row), self.ledger.merge_time_s(row))
+            due = int(gate.row_due_step[row])
+            if due != NEVER:
+                self._due_step[row] = due
+                self._wake(due, row)
+                first_due = min(first_due, due)
+        self._announced = len(self.ledger)
+        return first_due
+
+    def entered(self) -> tuple[IntArray, IntArray]:
+        """Returns, a row each, which arrival it is and at which step it entered."""
+        count = len(self.ledger)
+        return self._gate.row_arrival[:count], self._gate.row_step[:count]
 
     def decide_now(self, step: int) -> None:
         """Has every ramp vehicle on the road planned at ``step``, wherever it is, front first."""
@@ -113,81 +149,46 @@ class Coordinator:
             self._decide((row,), step)
 
     def waiting(self) -> list[int]:
-        """Returns the arrivals (by number) that wait outside."""
-        return sorted([*self._queues[False], *self._queues[True]])
+        """Returns the arrivals (by number) that have not entered."""
+        return sorted(set(range(len(self._arrivals))) - set(self.entered()[0].tolist()))
 
-    def _handle(self, step: int) -> None:
-        while self._next_is(step, ENTRY):
-            _, _, number = heapq.heappop(self._events)
-            if number != NOBODY:
-                self._queues[self._arrivals[number].on_ramp].append(number)
-        self._admit(False, step)
-        self._admit(True, step)
+    def _handle_wakes(self, step: int) -> None:
         while subjects := self._woken(step):
             ready = tuple(row for row in subjects if not self._goes_on_to_station(row, step))
             if ready:
                 self._decide(ready, step)
 
-    def _next_is(self, step: int, kind: int) -> bool:
-        return bool(self._events) and self._events[0][:2] == (step, kind)
-
     def _woken(self, step: int) -> tuple[int, ...]:
         rows: dict[int, None] = {}
-        while self._next_is(step, WAKE):
-            _, _, row = heapq.heappop(self._events)
+        while self._wakes and self._wakes[0][0] == step:
+            _, row = heapq.heappop(self._wakes)
             if self._due_step.get(row, step) == step:
                 self._due_step.pop(row, None)
                 rows[row] = None
         return tuple(rows)
 
     def _wake(self, step: int, row: int) -> None:
-        heapq.heappush(self._events, (step, WAKE, row))
-
-    def _first_step_from(self, time_s: float) -> int:
-        return math.ceil(time_s / self._step_s - 1e-6)
-
-    def _admit(self, on_ramp: bool, step: int) -> None:
-        queue = self._queues[on_ramp]
-        while queue:
-            if not self._enter(queue[0], step):
-                heapq.heappush(self._events, (step + 1, ENTRY, NOBODY))
-                return
-            queue.popleft()
+        heapq.heappush(self._wakes, (step, row))
 
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts an arrival on the road, harmonised from there; False where that is not safe."""
-        arrival = self._arrivals[number]
-        time_s = step * self._step_s
-        row = self.ledger.add(arrival.length_m, arrival.on_ramp)
-        pieces = plan_entry(
-            self.ledger.fleet,
-            arrival.length_m,
-            arrival.on_ramp,
-            time_s,
+        self.ledger.make_room()
+        code = enter(
+            self.ledger.book,
+            self._gate,
+            number,
             station_m,
-            arrival.speed_mps,
+            step,
             self._rules,
+            self._examiner.bounds,
         )
-        if len(pieces) == 0:
-            self.ledger.withdraw(row)
-            return False
-        state = np.array([time_s, station_m, arrival.speed_mps])
-        verdict = self._examiner.entry(self.ledger, row, pieces, state)
-        if verdict.code != ACCEPTED:
-            self.ledger.withdraw(row)
-            self.refusals.append(Refusal(time_s, row, REASONS[verdict.code]))
-            return False
-        self.entries.append(Entry(number, step))
-        self._plant.enter(row, arrival, step)
-        self._commit(row, pieces, self.ledger.merge_time_s(row), step)
-        if arrival.on_ramp:
-            self._plan_when_due(row, pieces, step)
-        return True
+        if code not in (ACCEPTED, WAITS):
+            self._note_refusal(step, len(self.ledger), code)
+        self._announce_entries()
+        return bool(code == ACCEPTED)
 
-    def _enter(self, number: int, step: int) -> bool:
-        road = self._rules.road
-        on_ramp = self._arrivals[number].on_ramp
-        return self.place(number, road.ramp_start_m if on_ramp else road.mainline_start_m, step)
+    def _note_refusal(self, step: int, row: int, code: int) -> None:
+        self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self.ledger.commit(row, pieces, merge_time_s)
@@ -197,7 +198,7 @@ class Coordinator:
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
         due_s = decision_due_s(pieces, self._rules.road.decision_station_m)
-        self._due_step[row] = max(step, self._first_step_from(due_s))
+        self._due_step[row] = max(step, first_step_from(due_s, self._step_s))
         self._wake(self._due_step[row], row)
 
     def _goes_on_to_station(self, row: int, step: int) -> bool:
@@ -225,7 +226,7 @@ class Coordinator:
             return False
         verdict = self._examiner.change(self.ledger, moves, from_s)
         if verdict.code != ACCEPTED:
-            self.refusals.append(Refusal(time_s, row, REASONS[verdict.code]))
+            self._note_refusal(step, row, verdict.code)
             return False
         for move in moves:
             self._commit(move.row, move.pieces, move.merge_time_s, step)
@@ -249,7 +250,7 @@ class Coordinator:
             earliest_s = time_s + self._rules.control.actuation_delay_s
             verdict = self._examiner.change(self.ledger, trajectories, earliest_s)
             if verdict.code != ACCEPTED:
-                self._refuse(subjects, step, REASONS[verdict.code])
+                self._refuse(subjects, step, verdict.code)
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:
@@ -257,15 +258,16 @@ class Coordinator:
         self._memory = decision.memory
         self._record(decision, trajectories, time_s, margin_m)
         for wake_s, row in decision.wakes_s:
-            wake_step = self._first_step_from(wake_s)
+            wake_step = first_step_from(wake_s, self._step_s)
             self._wake(wake_step, row)
             if wake_step > step:
                 self._moves_up(row, step)
 
-    def _refuse(self, subjects: tuple[int, ...], step: int, reason: str) -> None:
-        retry_step = self._first_step_from(step * self._step_s + self._rules.control.retry_s)
+    def _refuse(self, subjects: tuple[int, ...], step: int, code: int) -> None:
+        retry_s = step * self._step_s + self._rules.control.retry_s
+        retry_step = first_step_from(retry_s, self._step_s)
         for row in subjects:
-            self.refusals.append(Refusal(step * self._step_s, row, reason))
+            self._note_refusal(step, row, code)
             self._wake(retry_step, row)
 
     def _record(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
+from coramp.coordination.book import BLOCKS
 from coramp.coordination.ledger import Ledger
 from coramp.core.trajectory import (
     ACCEL,
@@ -26,16 +27,17 @@ def driven_pieces(
     Each commitment counts until the next one of its vehicle takes over, the last one until the
     vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose and at the merge.
     """
-    blocks = sorted(ledger.history, key=lambda block: int(vehicle_of_row[block.row]))
+    book, blocks = ledger.book, ledger.book.used[BLOCKS]
     merge_s, until_s = np.full(vehicles, np.inf), np.full(vehicles, end_s)
-    for row, vehicle in enumerate(vehicle_of_row):
-        merge_s[vehicle] = ledger.merge_time_s(row)
-        until_s[vehicle] = min(end_s, ledger.exit_time_s(row))
+    merge_s[vehicle_of_row] = book.merge_time_s[: len(ledger)]
+    until_s[vehicle_of_row] = np.minimum(end_s, book.exit_s[: len(ledger)])
+    of_block = vehicle_of_row[book.block_row[:blocks]]
+    by_vehicle = np.argsort(of_block, kind="stable")
     return _stitched(
-        ledger.fleet.pieces,
-        np.array([vehicle_of_row[block.row] for block in blocks], np.int64),
-        np.array([block.first_piece for block in blocks], np.int64),
-        np.array([block.piece_count for block in blocks], np.int64),
+        book.pieces,
+        of_block[by_vehicle],
+        book.block_first[by_vehicle],
+        book.block_count[by_vehicle],
         merge_s,
         until_s,
     )

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coramp._kernel import FloatArray
-from coramp.audit.checker import Change, Vehicles, Verdict, examine
+from coramp._kernel import FloatArray, kernel
+from coramp.audit.checker import Change, Verdict, examine
 from coramp.audit.distances import Bounds
+from coramp.coordination.book import Book
+from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
 from coramp.core.fleet import MAX_CHANGED
 from coramp.core.rules import Rules
@@ -39,18 +41,13 @@ class Examiner:
     """Holds the buffers in which changes are laid before the checker."""
 
     def __init__(self, bounds: Bounds) -> None:
-        self._bounds = bounds
+        self.bounds = bounds
         self._rows = np.zeros(MAX_CHANGED, np.int64)
         self._count = np.zeros(MAX_CHANGED, np.int64)
         self._pieces = np.zeros((MAX_CHANGED, MAX_PIECES, 4))
         self._merge_s = np.zeros(MAX_CHANGED)
         self._start = np.zeros((MAX_CHANGED, 3))
         self._makes_gap = np.zeros(MAX_CHANGED, np.int64)
-
-    def entry(self, ledger: Ledger, row: int, pieces: FloatArray, state: FloatArray) -> Verdict:
-        """Returns the verdict on a vehicle that enters in ``state`` (time, station, speed)."""
-        self._lay(0, FollowTrajectory(row, pieces, ledger.merge_time_s(row)), state)
-        return self._examine(ledger, 1, float(state[0]))
 
     def change(
         self, ledger: Ledger, commands: Sequence[FollowTrajectory], earliest_s: float
@@ -60,7 +57,7 @@ class Examiner:
             start_s = command.pieces[0, 0]
             station_m, speed_mps = station_and_speed(ledger.trajectory(command.row), start_s)
             self._lay(k, command, np.array([start_s, station_m, speed_mps]))
-        return self._examine(ledger, len(commands), earliest_s)
+        return self._examine(ledger.book, len(commands), earliest_s)
 
     def _lay(self, k: int, command: FollowTrajectory, start: FloatArray) -> None:
         count = len(command.pieces)
@@ -71,16 +68,7 @@ class Examiner:
         self._start[k] = start
         self._makes_gap[k] = command.makes_gap
 
-    def _examine(self, ledger: Ledger, k: int, earliest_s: float) -> Verdict:
-        fleet = ledger.fleet
-        vehicles = Vehicles(
-            fleet.pieces,
-            fleet.first_piece,
-            fleet.piece_count,
-            fleet.length_m,
-            fleet.merge_time_s,
-            fleet.live,
-        )
+    def _examine(self, book: Book, k: int, earliest_s: float) -> Verdict:
         change = Change(
             self._rows[:k],
             self._count[:k],
@@ -89,4 +77,10 @@ class Examiner:
             self._start[:k],
             self._makes_gap[:k],
         )
-        return examine(vehicles, change, earliest_s, self._bounds)
+        return examine_change(book, change, earliest_s, self.bounds)
+
+
+@kernel
+def examine_change(book: Book, change: Change, earliest_s: float, bounds: Bounds) -> Verdict:
+    """Returns the checker's verdict on a change of what stands in the book."""
+    return examine(vehicles_of(book), change, earliest_s, bounds)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coramp._kernel import FloatArray, IntArray
+from coramp._kernel import FloatArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
@@ -26,13 +26,8 @@ def step_after_last_exit(coordinator: Coordinator, step_s: float) -> int:
     ledger = coordinator.ledger
     if coordinator.waiting():
         return NEVER
-    last_s = max((ledger.exit_time_s(row) for row in range(len(ledger))), default=0.0)
+    last_s = float(np.max(ledger.book.exit_s[: len(ledger)], initial=0.0))
     return NEVER if math.isinf(last_s) else math.ceil(last_s / step_s) + 2
-
-
-def vehicle_of_each_row(coordinator: Coordinator) -> IntArray:
-    """Returns the arrival's number of every row of the ledger."""
-    return np.array([entry.arrival for entry in coordinator.entries], np.int64)
 
 
 def cooperative_outcome(
@@ -50,11 +45,11 @@ def cooperative_outcome(
     it they are driven as they are.
     """
     ledger, end_s = coordinator.ledger, end_step * step_s
-    vehicle_of_row = vehicle_of_each_row(coordinator)
+    vehicle_of_row, entry_step = coordinator.entered()
     entry_s, merge_s, exit_s, error_m = (np.full(len(arrivals), np.nan) for _ in range(4))
-    entry_s[vehicle_of_row] = [entry.step * step_s for entry in coordinator.entries]
-    merge_s[vehicle_of_row] = [ledger.merge_time_s(row) for row in range(len(ledger))]
-    exit_s[vehicle_of_row] = [ledger.exit_time_s(row) for row in range(len(ledger))]
+    entry_s[vehicle_of_row] = entry_step * step_s
+    merge_s[vehicle_of_row] = ledger.book.merge_time_s[: len(ledger)]
+    exit_s[vehicle_of_row] = ledger.book.exit_s[: len(ledger)]
     error_m[vehicle_of_row] = plan_error_m
     merge_s[merge_s > end_s] = np.nan
     exit_s[exit_s > end_s] = np.nan

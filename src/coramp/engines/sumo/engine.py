@@ -21,7 +21,6 @@ from coramp.engines.outcomes import (
     cooperative_outcome,
     passages_of,
     step_after_last_exit,
-    vehicle_of_each_row,
 )
 from coramp.engines.sumo.cooperative import CooperativePlant
 from coramp.engines.sumo.demand import cooperative_routes, driver_routes
@@ -98,7 +97,7 @@ def run_cooperative(
         rules.control.step_s,
         end_step,
         np.array([vehicle.largest_error_m for vehicle in plant.vehicles]),
-        _driven(plant, vehicle_of_each_row(coordinator), len(arrivals)),
+        _driven(plant, coordinator.entered()[0], len(arrivals)),
         collisions,
     )
 

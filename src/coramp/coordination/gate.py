@@ -1,0 +1,189 @@
+"""The gate: arrivals enter as soon as it is safe, each stream in its order.
+
+One kernel lets in everyone up to the next decision, so that a run asks Python only for decisions.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp.audit.checker import ACCEPTED, Change, Vehicles, examine
+from coramp.audit.distances import Bounds
+from coramp.coordination.admission import decision_due_s, plan_entry
+from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_full, strike_exited
+from coramp.coordination.book import write_commitment as write
+from coramp.coordination.plant import Arrival
+from coramp.core.rules import Rules
+
+NEVER = 1 << 60
+WAITS = -1
+DONE, FULL, REFUSED = range(3)
+"""Why ``admit_until`` came back: nobody else is due, the book is full, the checker refused."""
+
+
+class Gate(NamedTuple):
+    """Arrivals, who is next on each stream (0 mainline, 1 ramp), and who entered when.
+
+    ``of_stream[s]`` lists the ``vehicles[s]`` arrivals of a stream; ``next_place[s]`` is the place
+    of the first that has not entered, and ``try_step[s]`` when that tries. ``row_*`` have an entry
+    a row of the book: its arrival, the step at which it entered, the one at which it is planned.
+    """
+
+    step: IntArray
+    on_ramp: BoolArray
+    speed_mps: FloatArray
+    length_m: FloatArray
+    of_stream: IntArray
+    vehicles: IntArray
+    next_place: IntArray
+    try_step: IntArray
+    row_arrival: IntArray
+    row_step: IntArray
+    row_due_step: IntArray
+
+
+class Stop(NamedTuple):
+    """Why, when and over which arrival ``admit_until`` came back, with the checker's code."""
+
+    why: int
+    step: int
+    arrival: int
+    code: int
+
+
+def gate_for(arrivals: Sequence[Arrival]) -> Gate:
+    """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
+    on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
+    streams = [np.flatnonzero(~on_ramp), np.flatnonzero(on_ramp)]
+    of_stream = np.zeros((2, len(arrivals)), np.int64)
+    for stream, numbers in enumerate(streams):
+        of_stream[stream, : len(numbers)] = numbers
+    return Gate(
+        np.array([arrival.step for arrival in arrivals], np.int64),
+        on_ramp,
+        np.array([arrival.speed_mps for arrival in arrivals], np.float64),
+        np.array([arrival.length_m for arrival in arrivals], np.float64),
+        of_stream,
+        np.array([len(numbers) for numbers in streams], np.int64),
+        np.zeros(2, np.int64),
+        np.full(2, NEVER),
+        np.zeros(len(arrivals), np.int64),
+        np.zeros(len(arrivals), np.int64),
+        np.full(len(arrivals), NEVER),
+    )
+
+
+@kernel
+def open_gate(gate: Gate) -> None:
+    """Lets the first arrival of each stream try when it is due."""
+    for stream in range(2):
+        _next_tries(gate, stream, 0)
+
+
+@kernel
+def _next_tries(gate: Gate, stream: int, step: int) -> None:
+    place = gate.next_place[stream]
+    if place < gate.vehicles[stream]:
+        gate.try_step[stream] = max(step, gate.step[gate.of_stream[stream, place]])
+    else:
+        gate.try_step[stream] = NEVER
+
+
+@kernel
+def admit_until(book: Book, gate: Gate, last_step: int, rules: Rules, bounds: Bounds) -> Stop:
+    """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
+
+    Whoever cannot enter safely tries again at the next step, and holds up those behind.
+    """
+    while True:
+        step = min(gate.try_step[0], gate.try_step[1])
+        if step > last_step:
+            return Stop(DONE, step, -1, ACCEPTED)
+        strike_exited(book, step * rules.control.step_s)
+        for stream in range(2):
+            while gate.try_step[stream] <= step:
+                if is_full(book):
+                    return Stop(FULL, step, -1, ACCEPTED)
+                arrival = gate.of_stream[stream, gate.next_place[stream]]
+                start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
+                code = enter(book, gate, arrival, start_m, step, rules, bounds)
+                if code == ACCEPTED:
+                    gate.next_place[stream] += 1
+                    _next_tries(gate, stream, step)
+                    last_step = min(last_step, gate.row_due_step[book.used[ROWS] - 1])
+                else:
+                    gate.try_step[stream] = step + 1
+                    if code != WAITS:
+                        return Stop(REFUSED, step, arrival, code)
+
+
+@kernel
+def enter(
+    book: Book,
+    gate: Gate,
+    arrival: int,
+    station_m: float,
+    step: int,
+    rules: Rules,
+    bounds: Bounds,
+) -> int:
+    """Puts an arrival on the road, harmonised from there, if the checker agrees.
+
+    Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, or the checker's reason.
+    """
+    time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
+    length_m, speed_mps = gate.length_m[arrival], gate.speed_mps[arrival]
+    pieces = plan_entry(fleet_of(book), length_m, on_ramp, time_s, station_m, speed_mps, rules)
+    if len(pieces) == 0:
+        return WAITS
+    row = add_row(book, length_m, on_ramp)
+    start = np.array([[time_s, station_m, speed_mps]])
+    code = examine_entry(book, row, pieces, start, bounds)
+    if code != ACCEPTED:
+        book.used[ROWS] -= 1
+        return code
+    road = rules.road
+    merge_s = book.merge_time_s[row]
+    write(book, row, pieces, merge_s, road.mainline_speed_mps, road.mainline_end_m)
+    gate.row_arrival[row], gate.row_step[row] = arrival, step
+    if on_ramp:
+        due_s = decision_due_s(pieces, road.decision_station_m)
+        gate.row_due_step[row] = max(step, first_step_from(due_s, rules.control.step_s))
+    return code
+
+
+@kernel
+def first_step_from(time_s: float, step_s: float) -> int:
+    """Returns the first step at or after a time."""
+    return int(np.ceil(time_s / step_s - 1e-6))
+
+
+@kernel
+def examine_entry(
+    book: Book, row: int, pieces: FloatArray, start: FloatArray, bounds: Bounds
+) -> int:
+    """Returns the checker's code for a vehicle that enters; start: time, station, speed."""
+    change = Change(
+        np.array([row]),
+        np.array([len(pieces)]),
+        pieces.reshape((1, len(pieces), 4)),
+        np.array([book.merge_time_s[row]]),
+        start,
+        np.zeros(1, np.int64),
+    )
+    return examine(vehicles_of(book), change, start[0, 0], bounds).code
+
+
+@kernel
+def vehicles_of(book: Book) -> Vehicles:
+    """Returns what is committed, as the checker reads it."""
+    return Vehicles(
+        book.pieces,
+        book.first_piece,
+        book.piece_count,
+        book.length_m,
+        book.merge_time_s,
+        book.live[: book.used[LIVE]],
+    )
