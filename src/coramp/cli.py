@@ -33,12 +33,21 @@ def _options(
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
 
-@app.command(epilog="Example: coramp scenarios --json")
-def scenarios(json: Json = False) -> None:
-    """List the built-in scenarios, snapshots and studies."""
+@app.command(epilog="Example: coramp scenarios paper > my-ramp.toml")
+def scenarios(
+    name: Annotated[
+        str | None, typer.Argument(help="Print this one's TOML, to start your own from.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the built-in scenarios, snapshots and studies, or print one of them."""
     from coramp.console import print_json, print_listing
     from coramp.listing import listing
+    from coramp.toml_files import builtin_text
 
+    if name is not None:
+        print(builtin_text(name), end="")
+        return
     found = listing()
     if json:
         print_json(found)

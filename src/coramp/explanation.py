@@ -7,7 +7,7 @@ run of last year as for a plan just made.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from coramp.core.conflict import in_conflict, mainline_station_at_merge_m, merge_station_m
@@ -105,6 +105,9 @@ def quantities(decision: Mapping[str, Any], scenario: Scenario) -> list[Quantity
     case = _case_of(decision, scenario)
     lines = [*_distances(case), *_free_movement(case), *_conflict(case)]
     if not math.isnan(case.accel_mps2):
+        if decision["rung"] == "delay":
+            case = _delayed(case)
+            lines.append(Quantity("24", "t_1", "time to the nose, delayed", case.t1_s, "s"))
         lines += _acceleration(case)
         if case.scenario:
             lines += _creation(case)
@@ -138,6 +141,13 @@ def _case_of(decision: Mapping[str, Any], scenario: Scenario) -> _Case:
         shift_m=number("largest_shift_m"),
         scenario=int(decision["scenario"] or 0),
     )
+
+
+def _delayed(case: _Case) -> _Case:
+    """The case of a vehicle that comes late: it passes the nose with the ramp's speed."""
+    nose_mps = case.rules.road.ramp_speed_mps
+    t2_s = acceleration_time_s(case.v0_mps, nose_mps, case.accel_mps2)
+    return replace(case, t1_s=case.merge_s - t2_s, nose_mps=nose_mps)
 
 
 def _distances(case: _Case) -> list[Quantity]:
@@ -297,14 +307,14 @@ def _acceleration(case: _Case) -> list[Quantity]:
         Quantity(
             "29",
             "",
-            "distance to X beyond L_r-X, had it kept v0",
+            "distance to X beyond the least planned, had it kept v0",
             front_balance_m(
                 case.x_m,
                 case.r_m,
                 v0,
                 case.nose_mps,
                 front_length_m,
-                clearance_m - case.rules.safety.execution_allowance_m,
+                clearance_m,
                 case.accel_mps2,
             ),
             "m",

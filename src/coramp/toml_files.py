@@ -14,14 +14,32 @@ from coramp.errors import CorampError
 
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
 Data = dict[str, Any]
+KINDS = ("scenarios", "snapshots", "studies")
 
 
 def builtin_names(kind: str) -> list[str]:
-    """Returns the names of the built-in files of a kind: scenarios, studies or snapshots."""
+    """Returns the names of the built-in files of one of the ``KINDS``."""
     folder = resources.files("coramp") / "data" / kind
     return sorted(
         f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
     )
+
+
+def builtin_text(name: str) -> str:
+    """Returns a built-in file as it is: the scenario of that name, or else snapshot, or study.
+
+    ``studies/paper`` asks for a kind. Raises CorampError where there is none.
+    """
+    asked, _, plain = name.rpartition("/")
+    for kind in (asked,) if asked in KINDS else KINDS:
+        if plain in builtin_names(kind):
+            return _builtin(kind, plain)
+    known = ", ".join(f"{kind}/{known}" for kind in KINDS for known in builtin_names(kind))
+    raise CorampError(f"{name}: nothing built in is called that; built in are {known}")
+
+
+def _builtin(kind: str, name: str) -> str:
+    return (resources.files("coramp") / "data" / kind / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def read(kind: str, name: str) -> tuple[str, Data]:
@@ -31,7 +49,7 @@ def read(kind: str, name: str) -> tuple[str, Data]:
     """
     if name in builtin_names(kind):
         label = name
-        text = (resources.files("coramp") / "data" / kind / f"{name}.toml").read_text()
+        text = _builtin(kind, name)
     else:
         label, text = name, _text_of(Path(name), kind)
     try:

@@ -8,8 +8,11 @@ import numpy as np
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.audit.distances import (
     Bounds,
+    Envelope,
+    envelope_of,
     lane_change_distance_m,
     least_margin_m,
+    margin_at_least_m,
     passes_s,
     state_at,
 )
@@ -98,7 +101,8 @@ def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bound
 
     Checks every new trajectory by itself, then every pair of a changed vehicle and any other on
     the road over all time. The margin is over Eq. 1, and over Eq. 15, 16 at lane changes; the
-    allowance is part of the test, not of the margin.
+    allowance is part of the test, not of the margin. A pair on the mainline whose envelopes show
+    that its margin is neither too small nor the least is not looked at piece by piece.
     """
     for k in range(len(change.rows)):
         code = _examine_alone(vehicles, change, k, earliest_s, bounds)
@@ -107,18 +111,21 @@ def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bound
     least = math.inf
     for k in range(len(change.rows)):
         row = change.rows[k]
-        for other in vehicles.live:
+        own = _envelope_on_mainline(change, k, bounds)
+        for other in vehicles.live[::-1]:  # who entered last is nearest to who enters
             k_other = _entry(change, other)
             if other == row or 0 <= k_other < k:
                 continue
-            code, margin = _examine_pair(vehicles, change, k, other, k_other, bounds)
+            code, margin = _examine_pair(vehicles, change, k, other, k_other, own, least, bounds)
             if code != ACCEPTED:
                 return Verdict(code, row, other, margin)
             least = min(least, margin)
         for k_other in range(k + 1, len(change.rows)):
             other = change.rows[k_other]
             if not _is_live(vehicles, other):
-                code, margin = _examine_pair(vehicles, change, k, other, k_other, bounds)
+                code, margin = _examine_pair(
+                    vehicles, change, k, other, k_other, own, least, bounds
+                )
                 if code != ACCEPTED:
                     return Verdict(code, row, other, margin)
                 least = min(least, margin)
@@ -265,7 +272,14 @@ def _examine_accelerations(pieces: FloatArray, merge_s: float, bounds: Bounds) -
 
 @kernel
 def _examine_pair(
-    vehicles: Vehicles, change: Change, k: int, other: int, k_other: int, bounds: Bounds
+    vehicles: Vehicles,
+    change: Change,
+    k: int,
+    other: int,
+    k_other: int,
+    my_envelope: Envelope,
+    least_so_far: float,
+    bounds: Bounds,
 ) -> tuple[int, float]:
     row = change.rows[k]
     mine, my_merge_s = change.pieces[k, : change.piece_count[k]], change.merge_s[k]
@@ -302,18 +316,32 @@ def _examine_pair(
         if at_merge < bounds.allowance_m - EXACT:
             return TOO_NEAR_AT_MERGE, at_merge
         least = min(least, at_merge)
+    start_s = max(from_s, mainline_from_s)
+    their_envelope = envelope_of(theirs, start_s, bounds.mainline_speed_mps)
+    my_station_m, _, _ = state_at(mine, start_s)
+    their_station_m, _, _ = state_at(theirs, start_s)
+    if my_station_m > their_station_m:
+        at_least = margin_at_least_m(my_envelope, my_length_m, their_envelope, bounds)
+    else:
+        at_least = margin_at_least_m(their_envelope, their_length_m, my_envelope, bounds)
+    if at_least > max(min(least, least_so_far), bounds.allowance_m):
+        return ACCEPTED, least
     on_mainline = _least_of_pair_m(
-        mine,
-        my_length_m,
-        theirs,
-        their_length_m,
-        max(from_s, mainline_from_s),
-        math.inf,
-        bounds,
+        mine, my_length_m, theirs, their_length_m, start_s, math.inf, bounds
     )
     if on_mainline < bounds.allowance_m - EXACT:
         return TOO_NEAR, on_mainline
     return ACCEPTED, min(least, on_mainline)
+
+
+@kernel
+def _envelope_on_mainline(change: Change, k: int, bounds: Bounds) -> Envelope:
+    """The envelope of a changed vehicle from when it is on the mainline, if ever."""
+    pieces = change.pieces[k, : change.piece_count[k]]
+    from_s = max(pieces[0, 0], change.merge_s[k])
+    if from_s == math.inf:
+        return Envelope(-math.inf, math.inf, 0.0, math.inf)
+    return envelope_of(pieces, from_s, bounds.mainline_speed_mps)
 
 
 @kernel

@@ -165,3 +165,50 @@ def least_margin_m(
         if until_s >= end_s:
             return least
         now_s = until_s
+
+
+class Envelope(NamedTuple):
+    """Bounds from some time on, for ever: of ``station - v0 t`` (m) and of the speed (m/s)."""
+
+    lowest_m: float
+    highest_m: float
+    slowest_mps: float
+    fastest_mps: float
+
+
+@kernel
+def envelope_of(pieces: FloatArray, from_s: float, v0_mps: float) -> Envelope:
+    """Returns the envelope of a trajectory from ``from_s`` on."""
+    s, v, _ = state_at(pieces, from_s)
+    lowest_m = highest_m = s - v0_mps * from_s
+    slowest = fastest = v
+    last = pieces.shape[0] - 1
+    for k in range(last + 1):
+        t, s, v, a = pieces[k]
+        ends_s = math.inf if k == last else pieces[k + 1, 0]
+        if ends_s <= from_s:
+            continue
+        if t > from_s:
+            lowest_m, highest_m = min(lowest_m, s - v0_mps * t), max(highest_m, s - v0_mps * t)
+            slowest, fastest = min(slowest, v), max(fastest, v)
+        if a != 0.0:
+            turns_after_s = (v0_mps - v) / a
+            if max(t, from_s) < t + turns_after_s < ends_s:
+                turn_m = s + (v - v0_mps) * turns_after_s + a * turns_after_s**2 / 2.0 - v0_mps * t
+                lowest_m, highest_m = min(lowest_m, turn_m), max(highest_m, turn_m)
+    _, _, v, a = pieces[last]
+    if v < v0_mps or a < 0.0:
+        lowest_m = -math.inf
+    if v > v0_mps or a > 0.0:
+        highest_m = fastest = math.inf
+    return Envelope(lowest_m, highest_m, slowest, fastest)
+
+
+@kernel
+def margin_at_least_m(
+    front: Envelope, front_length_m: float, rear: Envelope, bounds: Bounds
+) -> float:
+    """Returns what the margin over Eq. 1 (m) can never fall below, however times coincide."""
+    needed_m = following_distance_m(front.slowest_mps, rear.fastest_mps, bounds)
+    needed_m += bounds.clock_error_s * (front.fastest_mps - front.slowest_mps)
+    return front.lowest_m - front_length_m - rear.highest_m - needed_m

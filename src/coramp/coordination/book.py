@@ -67,7 +67,7 @@ def empty_book(rows: int, pieces: int) -> Book:
 
 def with_room(book: Book) -> Book:
     """Returns the book, or one with more room where less than one more commitment fits."""
-    if not is_full(book):
+    if not is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
         return book
     rows, pieces = len(book.live), len(book.pieces)
     larger = empty_book(2 * rows, 2 * pieces + MAX_PIECES)
@@ -77,13 +77,9 @@ def with_room(book: Book) -> Book:
 
 
 @kernel
-def is_full(book: Book) -> bool:
-    """Returns whether there may be no room for one more row or commitment."""
-    return bool(
-        book.used[ROWS] >= len(book.live)
-        or book.used[BLOCKS] >= len(book.block_row)
-        or book.used[PIECES] + MAX_PIECES > len(book.pieces)
-    )
+def is_full(used: IntArray, rows: int, blocks: int, pieces: int) -> bool:
+    """Returns whether so much room may be too little for one more row or commitment."""
+    return bool(used[ROWS] >= rows or used[BLOCKS] >= blocks or used[PIECES] + MAX_PIECES > pieces)
 
 
 @kernel

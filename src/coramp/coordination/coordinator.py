@@ -104,7 +104,6 @@ class Coordinator:
                 continue
             step = self._wakes[0][0]
             self._plant.advance(step)
-            self.ledger.forget_exited(step * self._step_s)
             self._handle_wakes(step)
 
     def _admit(self, last_step: int) -> None:

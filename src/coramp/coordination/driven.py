@@ -17,6 +17,8 @@ from coramp.core.trajectory import (
 
 RAMP, ACCELERATION, MAINLINE = 0, 1, 2
 """Codes of the lanes that pieces lie on."""
+SLIVER_S = 1e-9
+"""Pieces that rounding leaves shorter than this are left out."""
 
 
 def driven_pieces(
@@ -67,7 +69,7 @@ def _stitched(
         for k in range(len(pieces)):
             start_s = pieces[k, TIME]
             end_s = min(piece_end_s(pieces, k), block_end_s)
-            while start_s < end_s:
+            while start_s < end_s - SLIVER_S:
                 n, start_s = _cut(pieces, k, start_s, end_s, merge_s[vehicle], lane, rows, n)
         first[vehicle + 1] = n
     for vehicle in range(vehicles):

@@ -95,16 +95,17 @@ def _next_tries(gate: Gate, stream: int, step: int) -> None:
 def admit_until(book: Book, gate: Gate, last_step: int, rules: Rules, bounds: Bounds) -> Stop:
     """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
 
-    Whoever cannot enter safely tries again at the next step, and holds up those behind.
+    Whoever cannot enter safely tries again at the next step, and holds up those behind. Whoever has
+    left the zone by then is off the live list.
     """
     while True:
         step = min(gate.try_step[0], gate.try_step[1])
+        strike_exited(book, min(step, last_step) * rules.control.step_s)
         if step > last_step:
             return Stop(DONE, step, -1, ACCEPTED)
-        strike_exited(book, step * rules.control.step_s)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if is_full(book):
+                if is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
                     return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m

@@ -14,7 +14,6 @@ from coramp.coordination.book import (
     add_row,
     empty_book,
     states_of_live,
-    strike_exited,
     with_room,
     write_commitment,
 )
@@ -77,10 +76,6 @@ class Ledger:
         write_commitment(
             self.book, row, pieces, merge_time_s, self._cruise_speed_mps, self._zone_end_m
         )
-
-    def forget_exited(self, time_s: float) -> None:
-        """Takes vehicles off the live list that have left the zone by ``time_s``."""
-        strike_exited(self.book, time_s)
 
     def reports(self, time_s: float) -> Reports:
         """Returns what the live vehicles would report of themselves: exactly what they promised."""

@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 from coramp._kernel import FloatArray, kernel
 from coramp.core.conflict_risk import conflict_severity_m2ps4
-from coramp.core.fleet import Fleet, Proposal, committed, proposed, trajectory_under
-from coramp.core.ramp_queue import next_behind_on_ramp
+from coramp.core.fleet import Fleet, Proposal, committed, trajectory_under
 from coramp.core.rules import Rules
 from coramp.core.safe_distance import merging_speed_along_mps
 from coramp.core.trajectory import station_and_speed
@@ -18,7 +17,7 @@ from coramp.strategies.situation import (
     MergePlan,
     Situation,
     gap_size_m,
-    ramp_is_blocked,
+    ramp_neighbours,
 )
 
 Planner = Callable[[Fleet, int, float, float, Rules], tuple[MergePlan, Proposal]]
@@ -130,7 +129,7 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     rest = tuple((view.time_s, other) for other in view.subjects[1:])
     from_s = view.time_s + view.rules.control.actuation_delay_s
     plan, proposal = planner(view.fleet, row, view.time_s, view.fastest_entry_mps, view.rules)
-    blocked = ramp_is_blocked(view.fleet, row, from_s)
+    blocked, behind = ramp_neighbours(view.fleet, row, from_s)
     if blocked or plan.rung == RUNG_HOLD:
         again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
         reasons = () if row in waiting else (held(row, plan),)
@@ -138,13 +137,12 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     commands = tuple(
         FollowTrajectory(
             int(proposal.rows[k]),
-            proposed(proposal, k).copy(),
+            proposal.pieces[k, : proposal.piece_count[k]].copy(),
             float(proposal.merge_time_s[k]),
             makes_gap=k > 0,
         )
         for k in range(int(proposal.size[0]))
     )
-    behind = next_behind_on_ramp(view.fleet, row, from_s)
     follow_up = ((view.time_s, behind),) if behind in waiting else ()
     return Decision(commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan),))
 

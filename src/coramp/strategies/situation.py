@@ -11,6 +11,7 @@ from coramp.core.conflict import conflict_index
 from coramp.core.fleet import Fleet, committed
 from coramp.core.gaps import least_acceleration_mps2
 from coramp.core.ramp_acceleration import lag_m
+from coramp.core.ramp_queue import next_behind_on_ramp
 from coramp.core.rules import Rules
 from coramp.core.safe_distance import merge_clearance_m
 from coramp.core.trajectory import (
@@ -81,15 +82,18 @@ class MergePlan(NamedTuple):
 
 
 @kernel
-def ramp_is_blocked(fleet: Fleet, subject: int, from_s: float) -> bool:
-    """Returns whether a vehicle ahead on the ramp has no committed merge yet."""
+def ramp_neighbours(fleet: Fleet, subject: int, from_s: float) -> tuple[bool, int]:
+    """Returns whether a vehicle ahead on the ramp has no committed merge yet, and who is behind.
+
+    The latter is the next row without a committed merge, or -1.
+    """
     own_m, _ = station_and_speed(committed(fleet, subject), from_s)
+    blocked = False
     for row in fleet.live:
-        if row != subject and math.isinf(fleet.merge_time_s[row]) and fleet.merge_time_s[row] > 0.0:
+        if row != subject and fleet.merge_time_s[row] == math.inf:
             other_m, _ = station_and_speed(committed(fleet, row), from_s)
-            if other_m > own_m:
-                return True
-    return False
+            blocked = blocked or other_m > own_m
+    return blocked, next_behind_on_ramp(fleet, subject, from_s)
 
 
 @kernel
