@@ -1,11 +1,12 @@
 """Who arrives when: random headways and entry speeds, the same for every strategy."""
 
 import zlib
+from itertools import count
 
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.coordination.plant import Arrival
+from coramp.coordination.plant import STREAMS, Arrival
 from coramp.scenario import Mainline, Ramp, Scenario
 
 
@@ -47,37 +48,39 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
 
     Vehicles are named by scheduled time: m00001, r00001 and so on.
     """
-    step_s = scenario.control.step_s
     if scenario.arrivals:
-        given = [
-            Arrival(
-                "",
-                arrival.stream == "ramp",
-                round(arrival.time_s / step_s),
-                arrival.speed_mps,
-                arrival.length_m or scenario.vehicle.length_m,
-            )
-            for arrival in scenario.arrivals
-        ]
+        given = _explicit_arrivals(scenario)
     else:
         given = [
-            *_stream_arrivals(scenario, "mainline", scenario.mainline, seed),
-            *_stream_arrivals(scenario, "ramp", scenario.ramp, seed),
+            *_stream_arrivals(scenario, False, scenario.mainline, seed),
+            *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
-    named, numbers = [], [0, 0]
-    for arrival in sorted(given, key=lambda a: (a.step, a.on_ramp)):
-        numbers[arrival.on_ramp] += 1
-        name = f"{'r' if arrival.on_ramp else 'm'}{numbers[arrival.on_ramp]:05d}"
-        named.append(
-            Arrival(name, arrival.on_ramp, arrival.step, arrival.speed_mps, arrival.length_m)
+    given.sort(key=lambda arrival: (arrival.step, arrival.on_ramp))
+    numbers = (count(1), count(1))
+    return [a._replace(vehicle_id=_name(a.on_ramp, next(numbers[a.on_ramp]))) for a in given]
+
+
+def _name(on_ramp: bool, number: int) -> str:
+    return f"{'r' if on_ramp else 'm'}{number:05d}"
+
+
+def _explicit_arrivals(scenario: Scenario) -> list[Arrival]:
+    return [
+        Arrival(
+            "",
+            arrival.stream == "ramp",
+            round(arrival.time_s / scenario.control.step_s),
+            arrival.speed_mps,
+            arrival.length_m or scenario.vehicle.length_m,
         )
-    return named
+        for arrival in scenario.arrivals
+    ]
 
 
 def _stream_arrivals(
-    scenario: Scenario, name: str, stream: Mainline | Ramp, seed: int
+    scenario: Scenario, on_ramp: bool, stream: Mainline | Ramp, seed: int
 ) -> list[Arrival]:
-    step_s = scenario.control.step_s
+    name, step_s = STREAMS[on_ramp], scenario.control.step_s
     times_s = arrival_times_s(
         stream.flow_veh_h,
         stream.min_headway_s,
@@ -87,7 +90,9 @@ def _stream_arrivals(
     )
     low_mps, high_mps = stream.entry_speed_mps
     speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
+    steps = np.rint(times_s / step_s).astype(np.int64)
+    length_m = scenario.vehicle.length_m
     return [
-        Arrival("", name == "ramp", round(time_s / step_s), float(speed), scenario.vehicle.length_m)
-        for time_s, speed in zip(times_s, speeds_mps, strict=True)
+        Arrival("", on_ramp, step, speed_mps, length_m)
+        for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
     ]

@@ -9,7 +9,6 @@ from coramp.coordination.coordinator import DecisionRecord, Refusal
 
 LANES = ("ramp", "acceleration", "mainline")
 """Names of the lane codes of ``coordination.driven``."""
-STREAMS = ("mainline", "ramp")
 
 
 @dataclass(frozen=True)

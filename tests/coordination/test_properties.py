@@ -1,7 +1,6 @@
 """What holds for any traffic: distances, causality, determinism, an end for everyone."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -152,11 +151,11 @@ def test_what_arrives_later_changes_no_decision_before(situation, step, random, 
         late.pop(random.randrange(len(late)))
     elif change == "retime" and late:
         k = random.randrange(len(late))
-        late[k] = replace(late[k], step=step + random.randrange(200))
+        late[k] = late[k]._replace(step=step + random.randrange(200))
     elif change == "insert":
         stream = random.random() < 0.5
         speed = (scenario.ramp if stream else scenario.mainline).entry_speed_mps[0]
-        late.append(replace(arrivals[0], on_ramp=stream, step=step, speed_mps=speed))
+        late.append(arrivals[0]._replace(on_ramp=stream, step=step, speed_mps=speed))
     else:
         late = []
     delay_s = scenario.control.actuation_delay_s

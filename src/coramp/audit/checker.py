@@ -6,55 +6,24 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.audit.distances import (
-    Bounds,
-    Envelope,
-    envelope_of,
-    lane_change_distance_m,
-    least_margin_m,
-    margin_at_least_m,
-    passes_s,
-    state_at,
-)
-
-(
+from coramp.audit.distances import Bounds, state_at
+from coramp.audit.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
+from coramp.audit.reasons import (
     ACCEPTED,
-    NOT_FINITE,
-    TIMES_NOT_ASCENDING,
-    STARTS_TOO_EARLY,
-    LEAVES_ITS_PATH,
-    HAS_A_JUMP,
-    TOO_FAST,
     BACKWARDS,
-    TOO_HARD,
+    CHANGES_THE_PAST,
+    EXACT,
+    HAS_A_JUMP,
+    JOIN,
+    LEAVES_ITS_PATH,
     MERGES_OUTSIDE_LANE,
     NO_SAFE_END,
-    TOO_NEAR,
-    TOO_NEAR_AT_MERGE,
-    CHANGES_THE_PAST,
-) = range(14)
-
-REASONS = (
-    "accepted",
-    "a value is not finite",
-    "times do not ascend",
-    "starts before the vehicle can act",
-    "does not start where the vehicle is",
-    "pieces do not join",
-    "faster than allowed",
-    "drives backwards",
-    "accelerates or brakes harder than allowed",
-    "merges outside the acceleration lane",
-    "does not end in a cruise on the mainline or a stop before the nose",
-    "comes nearer than the safe distance of Eq. 1",
-    "comes nearer than Eq. 15 or 16 at the lane change",
-    "changes a lane change that has happened, or the stream",
+    NOT_FINITE,
+    STARTS_TOO_EARLY,
+    TIMES_NOT_ASCENDING,
+    TOO_FAST,
+    TOO_HARD,
 )
-
-JOIN = 1e-6
-"""Tolerance (s, m, m/s, m/s2) for pieces to join and bounds to hold."""
-EXACT = 1e-9
-"""Tolerance (m) for distances."""
 
 
 class Vehicles(NamedTuple):
@@ -110,39 +79,48 @@ def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bound
             return Verdict(code, change.rows[k], -1, math.nan)
     least = math.inf
     for k in range(len(change.rows)):
-        row = change.rows[k]
-        own = _envelope_on_mainline(change, k, bounds)
+        row, mine = change.rows[k], _changed_way(vehicles, change, k)
+        from_s = mine.pieces[0, 0]
+        envelope = envelope_on_mainline(mine, bounds)
         for other in vehicles.live[::-1]:  # who entered last is nearest to who enters
-            k_other = _entry(change, other)
-            if other == row or 0 <= k_other < k:
+            if other == row or _entry(change.rows, other) >= 0:
                 continue
-            code, margin = _examine_pair(vehicles, change, k, other, k_other, own, least, bounds)
+            theirs = _committed_way(vehicles, other)
+            if surely_apart(mine, envelope, theirs, from_s, least, bounds):
+                continue
+            code, margin = examine_pair(mine, theirs, from_s, bounds)
             if code != ACCEPTED:
                 return Verdict(code, row, other, margin)
             least = min(least, margin)
         for k_other in range(k + 1, len(change.rows)):
-            other = change.rows[k_other]
-            if not _is_live(vehicles, other):
-                code, margin = _examine_pair(
-                    vehicles, change, k, other, k_other, own, least, bounds
-                )
-                if code != ACCEPTED:
-                    return Verdict(code, row, other, margin)
-                least = min(least, margin)
+            theirs = _changed_way(vehicles, change, k_other)
+            both_from_s = max(from_s, theirs.pieces[0, 0])
+            code, margin = examine_pair(mine, theirs, both_from_s, bounds)
+            if code != ACCEPTED:
+                return Verdict(code, row, change.rows[k_other], margin)
+            least = min(least, margin)
     return Verdict(ACCEPTED, -1, -1, least)
 
 
 @kernel
-def _entry(change: Change, row: int) -> int:
-    for k in range(len(change.rows)):
-        if change.rows[k] == row:
-            return k
-    return -1
+def _changed_way(vehicles: Vehicles, change: Change, k: int) -> Way:
+    pieces = change.pieces[k, : change.piece_count[k]]
+    return Way(pieces, vehicles.length_m[change.rows[k]], change.merge_s[k])
 
 
 @kernel
-def _is_live(vehicles: Vehicles, row: int) -> bool:
-    return bool(np.any(vehicles.live == row))
+def _committed_way(vehicles: Vehicles, row: int) -> Way:
+    first = vehicles.first[row]
+    pieces = vehicles.pieces[first : first + vehicles.piece_count[row]]
+    return Way(pieces, vehicles.length_m[row], vehicles.merge_s[row])
+
+
+@kernel
+def _entry(rows: IntArray, row: int) -> int:
+    for k in range(len(rows)):
+        if rows[k] == row:
+            return k
+    return -1
 
 
 @kernel
@@ -268,113 +246,3 @@ def _examine_accelerations(pieces: FloatArray, merge_s: float, bounds: Bounds) -
         if abs(a) > most_mps2 + JOIN:
             return TOO_HARD
     return ACCEPTED
-
-
-@kernel
-def _examine_pair(
-    vehicles: Vehicles,
-    change: Change,
-    k: int,
-    other: int,
-    k_other: int,
-    my_envelope: Envelope,
-    least_so_far: float,
-    bounds: Bounds,
-) -> tuple[int, float]:
-    row = change.rows[k]
-    mine, my_merge_s = change.pieces[k, : change.piece_count[k]], change.merge_s[k]
-    first = vehicles.first[other] if k_other < 0 else 0
-    theirs = vehicles.pieces[first : first + vehicles.piece_count[other]]
-    their_merge_s = vehicles.merge_s[other]
-    from_s = mine[0, 0]
-    if k_other >= 0:
-        theirs = change.pieces[k_other, : change.piece_count[k_other]]
-        their_merge_s = change.merge_s[k_other]
-        from_s = max(from_s, theirs[0, 0])
-    my_length_m, their_length_m = vehicles.length_m[row], vehicles.length_m[other]
-    least = math.inf
-    ramp_until_s = min(my_merge_s, their_merge_s)
-    if ramp_until_s > from_s:
-        least = _least_of_pair_m(
-            mine, my_length_m, theirs, their_length_m, from_s, ramp_until_s, bounds
-        )
-        if least < bounds.allowance_m - EXACT:
-            return TOO_NEAR, least
-    mainline_from_s = max(my_merge_s, their_merge_s)
-    if mainline_from_s == math.inf:
-        return ACCEPTED, least
-    if mainline_from_s >= from_s:
-        i_merge = my_merge_s >= their_merge_s
-        at_merge = _margin_at_merge_m(
-            mine if i_merge else theirs,
-            my_length_m if i_merge else their_length_m,
-            theirs if i_merge else mine,
-            their_length_m if i_merge else my_length_m,
-            mainline_from_s,
-            bounds,
-        )
-        if at_merge < bounds.allowance_m - EXACT:
-            return TOO_NEAR_AT_MERGE, at_merge
-        least = min(least, at_merge)
-    start_s = max(from_s, mainline_from_s)
-    their_envelope = envelope_of(theirs, start_s, bounds.mainline_speed_mps)
-    my_station_m, _, _ = state_at(mine, start_s)
-    their_station_m, _, _ = state_at(theirs, start_s)
-    if my_station_m > their_station_m:
-        at_least = margin_at_least_m(my_envelope, my_length_m, their_envelope, bounds)
-    else:
-        at_least = margin_at_least_m(their_envelope, their_length_m, my_envelope, bounds)
-    if at_least > max(min(least, least_so_far), bounds.allowance_m):
-        return ACCEPTED, least
-    on_mainline = _least_of_pair_m(
-        mine, my_length_m, theirs, their_length_m, start_s, math.inf, bounds
-    )
-    if on_mainline < bounds.allowance_m - EXACT:
-        return TOO_NEAR, on_mainline
-    return ACCEPTED, min(least, on_mainline)
-
-
-@kernel
-def _envelope_on_mainline(change: Change, k: int, bounds: Bounds) -> Envelope:
-    """The envelope of a changed vehicle from when it is on the mainline, if ever."""
-    pieces = change.pieces[k, : change.piece_count[k]]
-    from_s = max(pieces[0, 0], change.merge_s[k])
-    if from_s == math.inf:
-        return Envelope(-math.inf, math.inf, 0.0, math.inf)
-    return envelope_of(pieces, from_s, bounds.mainline_speed_mps)
-
-
-@kernel
-def _least_of_pair_m(
-    mine: FloatArray,
-    my_length_m: float,
-    theirs: FloatArray,
-    their_length_m: float,
-    start_s: float,
-    end_s: float,
-    bounds: Bounds,
-) -> float:
-    my_station_m, _, _ = state_at(mine, start_s)
-    their_station_m, _, _ = state_at(theirs, start_s)
-    if my_station_m > their_station_m:
-        until_s = min(end_s, passes_s(mine, bounds.zone_end_m))
-        return least_margin_m(mine, my_length_m, theirs, start_s, until_s, bounds)
-    until_s = min(end_s, passes_s(theirs, bounds.zone_end_m))
-    return least_margin_m(theirs, their_length_m, mine, start_s, until_s, bounds)
-
-
-@kernel
-def _margin_at_merge_m(
-    merging: FloatArray,
-    merging_length_m: float,
-    other: FloatArray,
-    other_length_m: float,
-    merge_s: float,
-    bounds: Bounds,
-) -> float:
-    s_merging, v_merging, _ = state_at(merging, merge_s)
-    s_other, v_other, _ = state_at(other, merge_s)
-    needed_m = lane_change_distance_m(v_merging, v_other, bounds)
-    if s_other > s_merging:
-        return s_other - other_length_m - s_merging - needed_m
-    return s_merging - merging_length_m - s_other - needed_m

@@ -208,7 +208,16 @@ def envelope_of(pieces: FloatArray, from_s: float, v0_mps: float) -> Envelope:
 def margin_at_least_m(
     front: Envelope, front_length_m: float, rear: Envelope, bounds: Bounds
 ) -> float:
-    """Returns what the margin over Eq. 1 (m) can never fall below, however times coincide."""
-    needed_m = following_distance_m(front.slowest_mps, rear.fastest_mps, bounds)
-    needed_m += bounds.clock_error_s * (front.fastest_mps - front.slowest_mps)
+    """Returns what the margins over Eq. 1, 15 and 16 (m) never fall below, however times coincide.
+
+    Meaningless, and negative, where ``front`` may be behind ``rear``.
+    """
+    following_m = following_distance_m(front.slowest_mps, rear.fastest_mps, bounds)
+    following_m += bounds.clock_error_s * (front.fastest_mps - front.slowest_mps)
+    slowest_mps = min(front.slowest_mps, rear.slowest_mps)
+    fastest_mps = max(front.fastest_mps, rear.fastest_mps)
+    lane_change_m = lane_change_distance_m(slowest_mps, fastest_mps, bounds)
+    if fastest_mps * bounds.cos_merge_angle > slowest_mps:
+        lane_change_m = max(lane_change_m, lane_change_distance_m(fastest_mps, slowest_mps, bounds))
+    needed_m = max(following_m, lane_change_m)
     return front.lowest_m - front_length_m - rear.highest_m - needed_m

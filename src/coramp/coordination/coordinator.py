@@ -7,9 +7,10 @@ import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.audit.checker import ACCEPTED, REASONS
+from coramp.audit.reasons import ACCEPTED, REASONS
 from coramp.coordination.admission import (
     decision_due_s,
     plan_moving_up,
@@ -233,12 +234,13 @@ class Coordinator:
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
         time_s = step * self._step_s
+        fleet = self.ledger.fleet
         view = View(
             time_s,
             subjects,
-            self.ledger.fleet,
-            self.ledger.fleet,
-            self.ledger.reports(time_s),
+            fleet,
+            fleet,
+            partial(self.ledger.reports, time_s),
             self._fastest_entry_mps,
             self._rules,
         )

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.audit.checker import ACCEPTED, Change, Vehicles, examine
+from coramp.audit.checker import Change, Vehicles, examine
 from coramp.audit.distances import Bounds
+from coramp.audit.reasons import ACCEPTED
 from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_full, strike_exited
 from coramp.coordination.book import write_commitment as write

@@ -1,13 +1,14 @@
 """What the loop needs of a world that carries vehicles: a simulator, the exact engine, a road."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from coramp._kernel import FloatArray
 
+STREAMS = ("mainline", "ramp")
+"""Names of the streams; a stream's place is also whether it comes by the ramp."""
 
-@dataclass(frozen=True, slots=True)
-class Arrival:
+
+class Arrival(NamedTuple):
     """A vehicle on its way to the zone: when it would enter (a step number) and how fast."""
 
     vehicle_id: str

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
+from coramp.coordination.plant import STREAMS
 from coramp.metrics.motion import BIN_S, binned_motion, fuel_of_each_l, hardest_braking_mps2
 from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, Schema
 from coramp.metrics.separations import (
@@ -21,7 +23,7 @@ from coramp.metrics.separations import (
     LaneUse,
     lane_extremes,
 )
-from coramp.records import LANES, STREAMS, Outcome
+from coramp.records import LANES, Outcome
 from coramp.scenario import Scenario
 from coramp.strategies.situation import RUNGS
 
@@ -32,32 +34,38 @@ Row = dict[str, Any]
 class RunTables:
     """The tables of a run; trajectories and decisions only where there were plans."""
 
+    outcome: Outcome
     vehicles: pl.DataFrame
     speeds: pl.DataFrame
-    trajectories: pl.DataFrame | None
-    decisions: pl.DataFrame | None
     metrics: Row
     streams: list[Row]
+
+    @cached_property
+    def trajectories(self) -> pl.DataFrame | None:
+        """One row a driven piece, made when it is asked for."""
+        return trajectories_table(self.outcome) if self.outcome.cooperative else None
+
+    @cached_property
+    def decisions(self) -> pl.DataFrame | None:
+        """One row a decision, made when it is asked for."""
+        outcome = self.outcome
+        if not outcome.cooperative:
+            return None
+        return decisions_table(
+            outcome.decisions, outcome.passages.vehicle_id, outcome.vehicle_of_row
+        )
 
 
 def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
     """Returns all tables and figures of a run."""
     vehicles, speeds = vehicles_table(outcome, scenario), speeds_table(outcome)
-    decisions = _decisions_of(outcome) if outcome.cooperative else None
     streams = [stream_figures(vehicles, speeds, name) for name in STREAMS]
     metrics = {
         **_stream_metrics(streams),
         **safety_figures(outcome, scenario),
-        **_decision_figures(outcome, decisions),
+        **_decision_figures(outcome),
     }
-    return RunTables(
-        vehicles,
-        speeds,
-        trajectories_table(outcome) if outcome.cooperative else None,
-        decisions,
-        metrics,
-        streams,
-    )
+    return RunTables(outcome, vehicles, speeds, metrics, streams)
 
 
 def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
@@ -97,7 +105,7 @@ def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
 
 
 def _stream_names(on_ramp: BoolArray) -> list[str]:
-    return [STREAMS[1] if ramp else STREAMS[0] for ramp in on_ramp]
+    return [STREAMS[ramp] for ramp in on_ramp.tolist()]
 
 
 def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
@@ -143,10 +151,6 @@ def trajectories_table(outcome: Outcome) -> pl.DataFrame:
         speed_mps=pieces.rows[:, 2],
         accel_mps2=pieces.rows[:, 3],
     )
-
-
-def _decisions_of(outcome: Outcome) -> pl.DataFrame:
-    return decisions_table(outcome.decisions, outcome.passages.vehicle_id, outcome.vehicle_of_row)
 
 
 NAMED_ROWS = {
@@ -250,14 +254,18 @@ def _largest(values: FloatArray) -> float | None:
     return float(known.max()) if len(known) else None
 
 
-def _decision_figures(outcome: Outcome, decisions: pl.DataFrame | None) -> Row:
+def _decision_figures(outcome: Outcome) -> Row:
     """How many ramp vehicles each rung served (hold: how many waited), how many others moved."""
-    if decisions is None:
+    if not outcome.cooperative:
         rungs = {f"rung_{rung}": None for rung in RUNGS}
         return {"adjusted_vehicles": None, **rungs, "refused_plans": None}
-    adjusted = {row for decision in outcome.decisions for row in decision.adjusted_rows}
+    served: dict[str, set[int]] = {rung: set() for rung in RUNGS}
+    adjusted: set[int] = set()
+    for decision in outcome.decisions:
+        served[decision.explanation.rung].add(decision.explanation.row)
+        adjusted.update(decision.adjusted_rows)
     return {
         "adjusted_vehicles": len(adjusted),
-        **{f"rung_{rung}": decisions.filter(rung=rung)["vehicle_id"].n_unique() for rung in RUNGS},
+        **{f"rung_{rung}": len(rows) for rung, rows in served.items()},
         "refused_plans": len(outcome.refusals),
     }

@@ -4,8 +4,9 @@ A strategy is asked when a cooperative vehicle reaches its decision station and 
 asked to be woken. It answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 from coramp._kernel import FloatArray
@@ -26,23 +27,29 @@ class Reports:
     std_m: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class View:
     """What the coordinator knows at ``time_s``: who has entered, and what they have committed to.
 
     ``subjects`` are the rows that the strategy is asked about, in the order in which they reached
     their decision stations. ``acknowledged`` holds the commitments that vehicles have confirmed;
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
-    which mainline vehicles enter. A strategy must not write into any of the arrays.
+    which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
+    ``reports``. A strategy must not write into any of the arrays.
     """
 
     time_s: float
     subjects: tuple[int, ...]
     fleet: Fleet
     acknowledged: Fleet
-    reports: Reports
+    ask_reports: Callable[[], Reports]
     fastest_entry_mps: float
     rules: Rules
+
+    @cached_property
+    def reports(self) -> Reports:
+        """The last reports of all live vehicles."""
+        return self.ask_reports()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,144 @@
+"""Ramp vehicles that queue before the nose; the planned clearance at a stand is 0.14 m."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from coramp.core.approach import append_stop, harmonise
+from coramp.core.fleet import MAX_CHANGED, empty_proposal, pair_margin_m
+from coramp.core.ramp_queue import next_behind_on_ramp, propose_place_ahead, propose_stop
+from tests.core import RULES, close, fleet_of, pieces, sampled
+
+UNDECIDED = math.inf
+
+
+def stopping(station_m, stop_m, speed_mps=16.0):
+    """Cruises and brakes by 2.5 m/s2 to a stand."""
+    cruise_s = (stop_m - station_m - speed_mps**2 / 5.0) / speed_mps
+    return pieces(0.0, station_m, speed_mps, [(speed_mps, cruise_s), (0.0, speed_mps / 2.5)])
+
+
+def _proposed(proposal, entry=0):
+    return proposal.pieces[entry, : proposal.piece_count[entry]]
+
+
+def test_next_behind_is_the_nearest_without_a_merge():
+    fleet = fleet_of(
+        (stopping(-100.0, -1.0), UNDECIDED, True),
+        (stopping(-160.0, -13.0), UNDECIDED, True),
+        (stopping(-130.0, -7.0), UNDECIDED, True),
+        (pieces(0.0, -115.0, 16.0), 20.0, True),  # merges
+        (pieces(0.0, -115.0, 20.0), -math.inf, True),  # on the mainline
+    )
+    assert next_behind_on_ramp(fleet, 0, 0.0) == 2
+    assert next_behind_on_ramp(fleet, 2, 0.0) == 1
+    assert next_behind_on_ramp(fleet, 1, 0.0) == -1
+    assert next_behind_on_ramp(fleet._replace(live=np.array([0, 1])), 0, 0.0) == 1
+
+
+def test_lone_vehicle_goes_on_to_its_stop_without_braking_before():
+    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_stop(fleet, proposal, 0, -10.0, 1.0, RULES)
+    expected = [[1.0, -144.0, 16.0, 0.0], [6.175, -61.2, 16.0, -2.5], [12.575, -10.0, 0.0, 0.0]]
+    assert _proposed(proposal) == close(np.array(expected))
+    assert (proposal.size[0], proposal.rows[0], proposal.merge_time_s[0]) == (1, 0, math.inf)
+
+
+def test_stop_that_is_too_near_adds_nothing():
+    fleet = fleet_of((pieces(0.0, -60.0, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert not propose_stop(fleet, proposal, 0, -10.0, 0.0, RULES)
+    assert proposal.size[0] == 0
+
+
+def test_full_proposal_takes_no_stop():
+    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    proposal.size[0] = MAX_CHANGED
+    assert not propose_stop(fleet, proposal, 0, -10.0, 0.0, RULES)
+    assert not propose_place_ahead(fleet, proposal, 0, -10.0, 0.0, RULES)
+
+
+def _brake_margin_m(leader, station_m, stop_m, steps):
+    """Margin of a vehicle behind ``leader`` that first brakes for that many steps."""
+    out = np.empty((20, 4))
+    n = harmonise(out, 0.0, station_m, 16.0, 0.0, steps * 0.1, 16.0, RULES.motion)
+    n = append_stop(out, n, stop_m, RULES.motion.stop_mps2)
+    assert n > 0
+    return pair_margin_m(leader, 5.0, math.inf, out[:n], 5.0, math.inf, 0.0, RULES)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    headway_m=st.floats(6.0, 30.0),
+    leader_mps=st.floats(8.0, 16.0),
+)
+def test_brake_before_the_stop_is_the_shortest_that_keeps_the_distance(headway_m, leader_mps):
+    leader = stopping(-120.0, -1.0, leader_mps)
+    station_m, stop_m = -120.0 - headway_m, -6.2
+    fleet = fleet_of((leader, UNDECIDED, True), (pieces(0.0, station_m, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    if not propose_stop(fleet, proposal, 1, stop_m, 0.0, RULES):
+        assert _brake_margin_m(leader, station_m, stop_m, 80) < 0.1
+        return
+    proposed = _proposed(proposal)
+    assert proposed[-1, 1:3].tolist() == [stop_m, 0.0]
+    margin_m = pair_margin_m(leader, 5.0, math.inf, proposed, 5.0, math.inf, 0.0, RULES)
+    assert margin_m >= 0.1 - 1e-9
+    steps = round((16.0 - proposed[1, 2]) / 0.2) if proposed[0, 3] == -2.0 else 0
+    assume(steps > 0)
+    assert _brake_margin_m(leader, station_m, stop_m, steps) == close(margin_m)
+    assert _brake_margin_m(leader, station_m, stop_m, steps - 1) < 0.1
+
+
+def test_vehicle_about_to_merge_is_kept_away_from_until_then():
+    merging = pieces(0.0, -110.0, 12.0, [(12.0, 20.0), (20.0, 4.0)])
+    fleet = fleet_of((merging, 24.0, True), (pieces(0.0, -120.0, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_stop(fleet, proposal, 1, -1.0, 0.0, RULES)
+    times_s = np.linspace(0.0, 24.0, 2401)
+    gap_m = sampled(merging, times_s)[0] - 5.0 - sampled(_proposed(proposal), times_s)[0]
+    assert gap_m.min() > 0.14
+    # once it has merged it is no matter on the ramp
+    gone = fleet._replace(merge_time_s=np.array([0.0, math.inf]))
+    free = empty_proposal()
+    assert propose_stop(gone, free, 1, -1.0, 0.0, RULES)
+    assert _proposed(free)[0, 3] == 0.0
+
+
+def test_place_ahead_drives_on_as_committed_and_leaves_out_the_old_stop():
+    fleet = fleet_of((stopping(-160.0, -30.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_place_ahead(fleet, proposal, 0, -10.0, 1.0, RULES)
+    expected = [[1.0, -144.0, 16.0, 0.0], [6.175, -61.2, 16.0, -2.5], [12.575, -10.0, 0.0, 0.0]]
+    assert _proposed(proposal) == close(np.array(expected))
+
+
+def test_place_ahead_brakes_where_someone_is_in_the_way():
+    leader = stopping(-110.0, -1.0, 12.0)
+    fleet = fleet_of((leader, UNDECIDED, True), (stopping(-120.0, -60.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_place_ahead(fleet, proposal, 1, -6.2, 0.0, RULES)
+    proposed = _proposed(proposal)
+    assert proposed[0, 3] == -2.0
+    assert proposed[-1, 1] == -6.2
+    margin_m = pair_margin_m(leader, 5.0, math.inf, proposed, 5.0, math.inf, 0.0, RULES)
+    assert margin_m >= 0.1 - 1e-9
+
+
+@pytest.mark.parametrize(("behind_m", "possible"), [(-150.0, True), (-125.5, False)])
+def test_place_ahead_must_not_touch_who_is_behind(behind_m, possible):
+    # braking for the leader brings the subject back onto a follower that is near
+    leader = stopping(-110.0, -1.0, 12.0)
+    fleet = fleet_of(
+        (leader, UNDECIDED, True),
+        (stopping(-120.0, -20.0), UNDECIDED, True),
+        (stopping(behind_m, -26.0), UNDECIDED, True),
+    )
+    proposal = empty_proposal()
+    assert propose_place_ahead(fleet, proposal, 1, -6.2, 0.0, RULES) is possible
+    assert proposal.size[0] == int(possible)
