@@ -16,11 +16,11 @@ from coramp.planning import PlannedSnapshot, plan_snapshot
 from coramp.run_folder import MARK, run_content, write_run
 from coramp.running import RunSpec, broken_promises, execute, make_spec
 from coramp.snapshots import load_snapshot
-from coramp.study.definition import expand, load_study
-from coramp.study.runner import Progress, run_missing, usable_cores
-from coramp.study.store import Store
-from coramp.study.summary import summary_tables, to_markdown
-from coramp.study.tables import Table
+from coramp.studies.definition import expand, load_study
+from coramp.studies.runner import Progress, run_missing, usable_cores
+from coramp.studies.store import Store
+from coramp.studies.summary import summary_tables, to_markdown
+from coramp.studies.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -201,7 +201,7 @@ def study(
     jobs = usable_cores() if jobs is None else jobs
     if jobs < 1:
         raise CorampError(f"--jobs: {jobs} is too small; allowed is at least 1")
-    specs = expand(definition, definition.seeds if seeds is None else seeds)
+    specs = expand(definition, definition.seeds if seeds is None else seeds, name)
     folder = Path(out) if out is not None else Path("out") / definition.name
     store = Store(folder, definition)
     parts = run_missing(store, specs, jobs, progress or (lambda _: None))
@@ -229,4 +229,9 @@ def as_pandas(frame: pl.DataFrame) -> "pd.DataFrame":
         import pandas as pd
     except ImportError:
         raise CorampError("pandas is not installed; pip install pandas") from None
-    return pd.DataFrame(frame.to_dict(as_series=False))
+    return pd.DataFrame(
+        {
+            column.name: column.to_numpy() if column.dtype.is_float() else column.to_list()
+            for column in frame
+        }
+    )

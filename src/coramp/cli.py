@@ -152,7 +152,7 @@ def study(
 ) -> None:
     """Run a grid of runs; go on where an earlier start left off."""
     from coramp.api import study as run_study
-    from coramp.console import StudyProgress, print_json, print_study, study_json
+    from coramp.console import StudyProgress, counted, print_json, print_study, study_json
 
     with StudyProgress() as progress:
         result = run_study(name, seeds=seeds, jobs=jobs, out=out, progress=progress)
@@ -160,12 +160,16 @@ def study(
         print_json(study_json(result))
     else:
         print_study(result)
-    _exit_if_broken(result.broken_promises)
-    if result.failed.height:
-        raise CorampError(
-            f"{result.failed.height} runs failed; see the error column of "
-            f"{result.folder / 'runs.parquet'}, and start again to repeat them"
+    failed = result.failed.height
+    if failed:
+        print(
+            f"Error: {counted(failed, 'run')} failed; see the error column of "
+            f"{result.folder / 'runs.parquet'}, and start again to run what failed",
+            file=sys.stderr,
         )
+    _exit_if_broken(result.broken_promises)
+    if failed:
+        raise typer.Exit(WRONG)
 
 
 @app.command(epilog="Example: coramp explain out/r r00012")
@@ -194,7 +198,7 @@ def _exit_if_broken(broken: list[str]) -> None:
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Runs the command line and exits: 0 fine, 1 wrong value or failed run, 2 usage, 3 unsafe."""
-    given = sys.argv[1:] if arguments is None else arguments
+    given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     debug = DEBUG in given
     try:
         code = app([word for word in given if word != DEBUG], standalone_mode=False)
@@ -203,9 +207,14 @@ def main(arguments: list[str] | None = None) -> NoReturn:
             raise
         sys.exit(_report(error))
     except KeyboardInterrupt:
-        print("Error: stopped; start again to go on where this left off", file=sys.stderr)
-        sys.exit(STOPPED)
-    sys.exit(code if isinstance(code, int) else 0)
+        sys.exit(_stopped())
+    sys.exit(_stopped() if code == STOPPED else code if isinstance(code, int) else 0)
+
+
+def _stopped() -> int:
+    """Says that the user stopped it; returns the exit code."""
+    print("Error: stopped; start again to go on where this left off", file=sys.stderr)
+    return STOPPED
 
 
 def _report(error: Exception) -> int:

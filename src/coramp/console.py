@@ -19,8 +19,8 @@ from coramp.explanation import Quantity
 from coramp.metrics.tables import Row
 from coramp.running import finite_or_none
 from coramp.story import Story, told
-from coramp.study.runner import Progress as StudyState
-from coramp.study.tables import Table, number
+from coramp.studies.runner import Progress as StudyState
+from coramp.studies.tables import Table, number
 
 WIDE = 240
 """Columns of tables that do not go to a terminal."""
@@ -58,6 +58,11 @@ def print_listing(found: Mapping[str, Mapping[str, str]]) -> None:
         width = max(len(name) for name in entries)
         for name, text in entries.items():
             print(f"  {name:<{width}}  {text}")
+
+
+def counted(number: int, what: str) -> str:
+    """Returns a number of things in words."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 @contextmanager
@@ -314,7 +319,7 @@ class StudyProgress:
         if state.skipped:
             self._console.print(f"{state.skipped} of {state.total} runs are there already")
         if state.damaged:
-            self._console.print(f"{state.damaged} results were damaged and are run again")
+            self._console.print(f"{counted(state.damaged, 'result')} found damaged, to run again")
         self._bar.update(self._task, completed=state.skipped, total=state.total)
 
 

@@ -2,7 +2,7 @@
 
 from coramp.loading import load_scenario
 from coramp.snapshots import load_snapshot
-from coramp.study.definition import load_study
+from coramp.studies.definition import load_study
 from coramp.toml_files import builtin_names
 
 

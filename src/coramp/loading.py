@@ -7,23 +7,21 @@ from coramp.errors import CorampError
 from coramp.scenario import Scenario
 from coramp.toml_files import builtin_names, read, validated, with_overrides
 
-OPTIONS = {
-    "mainline.flow_veh_h": "--mainline",
-    "ramp.flow_veh_h": "--ramp",
-    "simulation.horizon_s": "--horizon",
-}
-"""Options of the command line that stand for keys of a scenario."""
 
-
-def load_scenario(name: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(
+    name: str,
+    overrides: Mapping[str, Any] | None = None,
+    origins: Mapping[str, str] | None = None,
+) -> Scenario:
     """Returns the built-in scenario of that name, or that of a file, with dotted keys overridden.
 
-    Raises CorampError with a message for each thing that is wrong.
+    ``origins`` says what to blame for an overridden key, else it is ``--set``. Raises CorampError
+    with a message for each thing that is wrong.
     """
     label, data = read("scenarios", name)
     overrides = overrides or {}
-    origins = {key: OPTIONS.get(key, "--set") for key in overrides}
-    return validated(Scenario, with_overrides(data, overrides), label, origins)
+    blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
+    return validated(Scenario, with_overrides(data, overrides, blamed), label, blamed)
 
 
 def builtin_scenarios() -> list[Scenario]:

@@ -47,6 +47,8 @@ def read_run(folder: Path) -> StoredRun:
             f"{folder}: holds no run; give a folder that coramp run --out has written"
         )
     content = read_json(folder / MARK)
+    if not isinstance(content, dict) or content.get("kind") != "run" or "summary" not in content:
+        raise CorampError(f"{folder / MARK}: does not describe a run; run again to write it anew")
     frames = {}
     for name in TABLES:
         path = folder / f"{name}.parquet"

@@ -24,6 +24,12 @@ ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
 LARGEST_PLAN_ERROR_M = 0.05
 FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
+OPTIONS = {
+    "mainline.flow_veh_h": "--mainline",
+    "ramp.flow_veh_h": "--ramp",
+    "simulation.horizon_s": "--horizon",
+}
+"""Options of the command line that stand for keys of a scenario."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +89,12 @@ def make_spec(
     overrides: Mapping[str, Any] | None = None,
     seed: int = 1,
     horizon_s: float | None = None,
+    blamed: str | None = None,
 ) -> RunSpec:
-    """Returns the specification of a run; raises CorampError for what cannot be run."""
+    """Returns the specification of a run; raises CorampError for what cannot be run.
+
+    Errors name the options of the command line, or else say ``blamed`` for all of them.
+    """
     chosen = strategy_named(strategy)
     if engine not in ENGINES:
         raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
@@ -92,20 +102,28 @@ def make_spec(
         raise CorampError(
             f"engine: exact has no drivers for {strategy}; choose sumo, or a cooperative strategy"
         )
-    if not 0 <= seed < 2**31:
+    if not isinstance(seed, int) or not 0 <= seed < 2**31:
         raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
-    settings = dict(overrides or {})
-    named = {
-        "mainline.flow_veh_h": mainline_veh_h,
-        "ramp.flow_veh_h": ramp_veh_h,
-        "simulation.horizon_s": horizon_s,
-    }
-    settings.update({key: float(value) for key, value in named.items() if value is not None})
-    loaded = load_scenario(scenario, settings)
+    others, values = dict(overrides or {}), (mainline_veh_h, ramp_veh_h, horizon_s)
+    named = {key: v for key, v in zip(OPTIONS, values, strict=True) if v is not None}
+    if twice := sorted(named.keys() & others.keys()):
+        options = ", ".join(f"{key} by {OPTIONS[key]} and by --set" for key in twice)
+        raise CorampError(f"{blamed or '--set'}: {options}: given twice; allowed is once")
+    blame = {**dict.fromkeys(others, "--set"), **{key: OPTIONS[key] for key in named}}
+    if blamed is not None:
+        blame = dict.fromkeys(blame, blamed)
+    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
     population = None
-    if not chosen.cooperative:
+    if drivers is not None or not chosen.cooperative:
         population = drivers_checked(loaded, drivers or DEFAULT_DRIVERS)
-    return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, settings))
+    if chosen.cooperative:
+        population = None
+    return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def _as_floats(named: Mapping[str, Any]) -> dict[str, Any]:
+    """Whole numbers as floats; what is no number is left to the scenario's checks."""
+    return {key: float(v) if isinstance(v, int | float) else v for key, v in named.items()}
 
 
 def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:

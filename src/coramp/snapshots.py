@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from coramp.core.safe_distance import safe_distance_m
+from coramp.errors import CorampError
 from coramp.loading import load_scenario
 from coramp.scenario import Model, Scenario, Speed
 from coramp.toml_files import read, validated
@@ -32,7 +33,10 @@ class Snapshot(Model):
 
     @model_validator(mode="after")
     def _works_together(self) -> Self:
-        scenario = self.road()
+        try:
+            scenario = self.road()
+        except CorampError as error:
+            raise ValueError("\n".join(f"scenario: {line}" for line in error.messages)) from None
         problems = [*_identity_problems(self), *_place_problems(self, scenario)]
         problems += _distance_problems(self, scenario)
         if problems:
@@ -41,7 +45,7 @@ class Snapshot(Model):
 
     def road(self) -> Scenario:
         """Returns the scenario, with what the snapshot sets."""
-        return load_scenario(self.scenario, self.set)
+        return load_scenario(self.scenario, self.set, dict.fromkeys(self.set, "set"))
 
     def length_m(self, vehicle: SnapshotVehicle) -> float:
         """Returns a vehicle's own length, or the scenario's."""

@@ -38,10 +38,8 @@ def story_of(folder: Path, vehicle_id: str) -> Story:
     found = run.vehicles.filter(vehicle_id=vehicle_id)
     if found.is_empty():
         known = sorted(run.vehicles["vehicle_id"].to_list())
-        first, last = known[0], known[-1]
-        raise CorampError(
-            f"{folder}: there is no vehicle {vehicle_id!r}; allowed are {first} to {last}"
-        )
+        allowed = f"allowed are {known[0]} to {known[-1]}" if known else "nobody arrived"
+        raise CorampError(f"{folder}: there is no vehicle {vehicle_id!r}; {allowed}")
     if run.decisions is None:
         raise CorampError(
             f"{folder}: nobody was coordinated in this run; explain a cooperative one"

@@ -94,8 +94,8 @@ def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
     return overrides
 
 
-def with_overrides(data: Data, overrides: Mapping[str, Any]) -> Data:
-    """Returns a copy of the data with dotted keys set."""
+def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[str, str]) -> Data:
+    """Returns a copy of the data with dotted keys set; ``origins`` says who set each."""
     result = _copied(data)
     for dotted, value in overrides.items():
         *parents, last = dotted.split(".")
@@ -103,7 +103,8 @@ def with_overrides(data: Data, overrides: Mapping[str, Any]) -> Data:
         for parent in parents:
             table = table.setdefault(parent, {})
             if not isinstance(table, dict):
-                raise CorampError(f"--set: {dotted}: {parent} is not a table; see coramp scenarios")
+                line = f"{dotted}: {parent} is not a table; see coramp scenarios"
+                raise CorampError(_blamed(line, origins[dotted]))
         table[last] = value
     return result
 
@@ -118,22 +119,39 @@ def validated(
     """Returns the model of the data.
 
     Raises CorampError with one message for each problem: where, which key, what is wrong, what is
-    allowed. ``overridden`` names where overridden keys came from, to be told instead of the label.
+    allowed. ``overridden`` names where overridden keys came from, to be told instead of the label;
+    an empty name leaves it to the caller to tell.
     """
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        lines = [line for problem in error.errors() for line in _lines_of(model, problem)]
+        lines = [line for problem in _causes(error) for line in _lines_of(model, problem)]
     messages = []
     for line in dict.fromkeys(lines):
         key = line.split(":", 1)[0]
         origins = [
             origin
             for name, origin in (overridden or {}).items()
-            if key == name or key.startswith(f"{name}.")
+            if key == name or key.startswith(f"{name}.") or name.startswith(f"{key}.")
         ]
-        messages.append(f"{origins[0] if origins else label}: {line}")
+        messages.append(_blamed(line, origins[0] if origins else label))
     raise CorampError(*messages)
+
+
+def _blamed(line: str, origin: str) -> str:
+    return f"{origin}: {line}" if origin else line
+
+
+def _causes(error: ValidationError) -> list[Any]:
+    """The problems without those that only follow: a list whose items fail counts as too short."""
+    problems = error.errors()
+    places = [problem["loc"] for problem in problems]
+    return [
+        problem
+        for problem in problems
+        if problem["type"] != "too_short"
+        or not any(p[: len(problem["loc"])] == problem["loc"] != p for p in places)
+    ]
 
 
 def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
@@ -164,7 +182,10 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
             | "too_long"
             | "missing_positional_only_argument"
         ):
-            return [f"{key}: {shown} has the wrong shape; allowed is a list like [15.0, 20.0]"]
+            field = model.model_fields.get(str(problem["loc"][0]))
+            tables = field is not None and _model_within(field.annotation) is not None
+            example = "of tables" if tables and len(problem["loc"]) == 1 else "like [15.0, 20.0]"
+            return [f"{key}: {shown} has the wrong shape; allowed is a list {example}"]
         case _:
             message = problem["msg"]
             return [f"{key}: {shown}: {message[0].lower()}{message[1:]}"]

@@ -19,7 +19,15 @@ from coramp.audit.distances import (
     state_at,
 )
 from coramp.core.separation import smallest_margin_m
-from tests.core import SAFETY, close, pieces, sampled, sampled_margins, trajectories
+from tests.core import (
+    SAFETY,
+    close,
+    pieces,
+    random_pairs,
+    sampled,
+    sampled_margins,
+    trajectories,
+)
 
 BOUNDS = Bounds(
     zone_end_m=400.0,
@@ -202,9 +210,20 @@ def test_empty_span_has_no_margin():
 def test_least_margin_agrees_with_sampling_and_with_the_planners(
     front, rear, after_s, lasts_s, budget
 ):
-    bounds, safety = budget
     start_s = max(front[0, 0], rear[0, 0]) + after_s
-    end_s = start_s + lasts_s
+    _assert_agreement(front, rear, start_s, start_s + lasts_s, budget)
+
+
+@pytest.mark.parametrize(
+    "budget", [(BOUNDS, SAFETY), (WIDE_BOUNDS, WIDE_SAFETY)], ids=["paper", "wide"]
+)
+def test_least_margin_of_busy_pairs_agrees_with_sampling_and_with_the_planners(budget):
+    for front, rear, start_s, lasts_s in random_pairs(2, 200):
+        _assert_agreement(front, rear, start_s, start_s + lasts_s, budget)
+
+
+def _assert_agreement(front, rear, start_s, end_s, budget):
+    bounds, safety = budget
     least_m = least_margin_m(front, 4.5, rear, start_s, end_s, bounds)
     planned_m, when_s = smallest_margin_m(front, 4.5, rear, start_s, end_s, safety)
     assert least_m == pytest.approx(planned_m, abs=1e-7)

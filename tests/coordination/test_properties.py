@@ -196,9 +196,8 @@ def test_a_plan_that_the_checker_refuses_is_not_driven():
         + [Arrival("", True, 100, 16.0, 5.0)]
     )
     coordinator = loop(scenario, arrivals, Reckless(), last_s=60.0)
-    assert {r.reason for r in coordinator.refusals} == {
-        "comes nearer than Eq. 15 or 16 at the lane change"
-    }
+    assert coordinator.refusals
+    assert all(r.reason.startswith("comes nearer than") for r in coordinator.refusals)
     row = [arrivals[k].on_ramp for k in coordinator.entered()[0]].index(True)
     assert math.isinf(coordinator.ledger.merge_time_s(row))
     assert coordinator.ledger.trajectory(row)[-1, 2] == 0.0

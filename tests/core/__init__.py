@@ -89,6 +89,18 @@ def trajectories(draw, most_stretches=4, start_s=None, station_m=None, end_speed
     return pieces(start_s, station_m, first_mps, stretches)
 
 
+def random_pairs(seed, how_many):
+    """Pairs of trajectories in which much happens, the first ahead of the second at time 0."""
+    rng = np.random.default_rng(seed)
+    for _ in range(how_many):
+        ways = []
+        for station_m in (30.0, 0.0):
+            speeds_mps, durations_s = rng.uniform(0.0, 25.0, 5), rng.uniform(0.5, 5.0, 4)
+            stretches = list(zip(speeds_mps[1:], durations_s, strict=True))
+            ways.append(pieces(0.0, station_m, speeds_mps[0], stretches))
+        yield *ways, rng.uniform(0.0, 4.0), rng.uniform(1.0, 15.0)
+
+
 def sampled(trajectory, times_s):
     """Stations and speeds at an array of times."""
     k = np.clip(np.searchsorted(trajectory[:, 0], times_s, side="right") - 1, 0, None)

@@ -127,6 +127,8 @@ def test_start_and_station_of_the_final_stop():
     assert stop_of_m(STOPPING) == -10.0
     assert stop_starts_s(STOPPING[:1]) == math.inf
     assert stop_starts_s(pieces(3.0, -10.0, 0.0)) == 3.0
+    assert stop_starts_s(pieces(0.0, -10.0, 0.5)) == math.inf
+    assert stop_starts_s(pieces(3.0, -10.0, 5.0, [(0.0, 2.0)])) == 3.0
     standing = np.array([[0.0, -10.0, 0.0, 0.0], [2.0, -10.0, 0.0, 0.0]])
     assert stop_starts_s(standing) == 2.0
 
@@ -170,12 +172,16 @@ def test_late_approach_cannot_be_early_or_slower_than_the_slowest():
     assert len(_written(late_approach, 0.0, -141.0, 16.0, 8.82, ROAD, MOTION)) == 4
     # by way of 2 m/s: 7 s and 63 m, 28/3 s and 84 m, which leaves nothing of 147 m
     latest_s = 7.0 + 28 / 3
-    assert len(_written(late_approach, 0.0, -147.0, 16.0, latest_s - 1e-3, ROAD, MOTION)) > 0
+    latest = _written(late_approach, 0.0, -147.0, 16.0, latest_s - 1e-3, ROAD, MOTION)
+    assert latest[-1] == pytest.approx(np.array([latest_s - 1e-3, 0.0, 16.0, 0.0]), abs=1e-6)
     assert len(_written(late_approach, 0.0, -147.0, 16.0, latest_s + 1e-3, ROAD, MOTION)) == 0
 
 
 def test_late_approach_needs_a_way_to_the_ramp_s_speed():
     assert len(_written(late_approach, 0.0, -1.0, 5.0, 0.2, ROAD, MOTION)) == 0
+    # 10 m leave room to slow down to 15.455 m/s and up again, 0.6358 s in all
+    assert len(_written(late_approach, 0.0, -10.0, 16.0, 0.635, ROAD, MOTION)) > 0
+    assert len(_written(late_approach, 0.0, -10.0, 16.0, 0.637, ROAD, MOTION)) == 0
     # 15 m/s needs (256 - 225) / 3 m to reach 16
     assert len(_written(late_approach, 0.0, -10.0, 15.0, 0.65, ROAD, MOTION)) == 0
 

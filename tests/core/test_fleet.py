@@ -6,6 +6,7 @@ A merges at 12 s at 36 m (free movement from -160 m at 16 m/s); X is then 15 m a
 import math
 
 import numpy as np
+import pytest
 
 from coramp.core.fleet import (
     committed,
@@ -87,6 +88,21 @@ def test_pair_of_stream_and_merging_vehicle_counts_from_the_merge():
     # once it is over the lane change is no matter: 10 - 0.04 - 1.2e-7
     assert _pair(A, 12.0, X, STREAM, from_s=12.5) == close(9.95999988)
     assert _pair(A, 12.0, X, STREAM, from_s=12.0) == close(10.0 - EQ_15_20)
+
+
+def test_pair_takes_the_speed_of_the_one_that_merges():
+    faster = pieces(0.0, -213.0, 22.0)  # at 51 m at 12 s
+    expected = close(10.0 - 0.04 - (3.6 * (22.0 - 17.320508075688772)) ** 2 / 129.54)
+    assert _pair(A, 12.0, faster, STREAM) == expected
+    assert _pair(faster, STREAM, A, 12.0) == expected
+
+
+@pytest.mark.parametrize("merge_s", [STREAM, 2.0])
+def test_pair_on_the_mainline_counts_from_now_on(merge_s):
+    leader, follower = pieces(0.0, 30.0, 22.0), pieces(0.0, 20.0, 20.0)
+    # 5 m at 0 s, 15 m at 5 s
+    assert _pair(leader, STREAM, follower, merge_s, from_s=5.0) == close(14.959999874)
+    assert _pair(follower, merge_s, leader, STREAM, from_s=5.0) == close(14.959999874)
 
 
 def test_pair_counts_eq_1_on_the_mainline_where_it_is_the_smaller():

@@ -4,10 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from coramp.core.fleet import MAX_CHANGED, empty_proposal, pair_margin_m
+from coramp.core.fleet import (
+    MAX_CHANGED,
+    empty_proposal,
+    merge_time_under_s,
+    pair_margin_m,
+    trajectory_under,
+)
 from coramp.core.proposals import (
     find_unsafe_pair,
     intercept_m,
@@ -17,7 +21,8 @@ from coramp.core.proposals import (
     push_ahead,
     push_back,
 )
-from tests.core import RULES, close, fleet_of, pieces, sampled, trajectories
+from coramp.core.trajectory import MAX_PIECES
+from tests.core import RULES, close, fleet_of, pieces, sampled, with_safety
 
 STREAM = -math.inf
 THREE = (30.0, 20.0, 10.0)  # 5 m between bumpers, 4.85999988 m beyond the clearance
@@ -115,6 +120,32 @@ def test_vehicle_still_to_merge_moves_only_after_its_merge():
     assert _shift(fleet, 0, 5.0, 16.0, 4.1) is None
 
 
+def test_bounds_are_for_what_a_shift_adds_not_for_what_is_committed():
+    entering_fast = fleet_of((pieces(0.0, -300.0, 23.0, [(23.0, 1.0), (20.0, 2.0)]), STREAM, True))
+    assert _shift(entering_fast, 0, 5.0, 11.0, 1.0) is not None
+    entering_slowly = fleet_of(
+        (pieces(0.0, -300.0, 15.0, [(15.0, 1.0), (20.0, 5.0)]), STREAM, True)
+    )
+    assert _shift(entering_slowly, 0, 7.0, 13.0, -1.0) is not None
+    merging = fleet_of((pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 0.8)]), 10.8, True))
+    assert _shift(merging, 0, 5.0, 16.8, 1.0) is not None
+
+
+def test_window_that_ends_before_the_merge_moves_nobody():
+    merging = pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 2.0)])
+    fleet = fleet_of((merging, 12.0, True))
+    assert _shift(fleet, 0, 5.0, 11.0, 1.0) is None
+    assert _shift(fleet, 0, 5.0, 11.0, 0.5) is None
+
+
+def test_trajectory_too_long_to_be_moved_is_left():
+    weaving = [(20.0 + 0.1 * (k % 2), 1.0) for k in range(MAX_PIECES - 4)]
+    fleet = fleet_of((pieces(0.0, -400.0, 20.0, weaving), STREAM, True))
+    assert _shift(fleet, 0, 1.0, 7.0, 0.5) is None
+    shorter = fleet_of((pieces(0.0, -400.0, 20.0, weaving[:-1]), STREAM, True))
+    assert _shift(shorter, 0, 1.0, 7.0, 0.5) is not None
+
+
 def test_intercept_is_the_final_cruise_run_back():
     fleet = fleet_of((pieces(2.0, 0.0, 16.0, [(20.0, 2.0)]), STREAM, True))
     assert intercept_m(fleet, 0, RULES) == close(-44.0)  # 36 - 20 * 4
@@ -129,6 +160,34 @@ def test_cascade_ahead_moves_each_leader_by_what_is_missing():
     moved_m = [_moved_m(proposal, fleet, entry) for entry in range(2)]
     assert moved_m == close([6.0, 6.0 - 4.85999988])
     assert find_unsafe_pair(fleet, proposal, 0.0, RULES) == (-1, -1)
+
+
+def test_cascade_ahead_ends_with_the_foremost():
+    fleet = _stream(*THREE)
+    order = np.array([0, 1, 2])
+    proposal = empty_proposal()
+    assert push_ahead(fleet, proposal, order, 2, 0.0, 0.0, 20.0, 12.0, RULES)
+    assert proposal.rows[: proposal.size[0]].tolist() == [2, 1, 0]
+    moved_m = [_moved_m(proposal, fleet, entry) for entry in range(3)]
+    assert moved_m == close([12.0, 12.0 - 4.85999988, 12.0 - 2 * 4.85999988])
+    proposal = empty_proposal()
+    assert push_ahead(fleet, proposal, order, 0, 0.0, 0.0, 20.0, 12.0, RULES)
+    assert proposal.rows[: proposal.size[0]].tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("merge_s", "leader_m"),
+    [(STREAM, 17 / 15), (4.0, 1.3)],  # in 6 s, or in the 4 s from the merge to the window's end
+)
+def test_cascade_ahead_with_a_time_gap_counts_the_time_there_is(merge_s, leader_m):
+    # 0.1 m beyond 0.14000012 m and half a second at 20 m/s: 2 (0.5 * 2 / T - 0.1) + 1
+    leader = pieces(0.0, 15.24000012, 20.0)
+    fleet = fleet_of((leader, STREAM, True), (pieces(0.0, 0.0, 20.0), merge_s, True))
+    proposal = empty_proposal()
+    rules = with_safety(time_gap_s=0.5)
+    assert push_ahead(fleet, proposal, np.array([0, 1]), 1, 0.0, 2.0, 8.0, 1.0, rules)
+    moved_m = [_moved_m(proposal, fleet, entry) for entry in range(2)]
+    assert moved_m == close([1.0, leader_m])
 
 
 def test_cascade_back_moves_each_follower_by_what_is_missing():
@@ -163,33 +222,50 @@ def test_no_safe_distance_exceeds_the_largest():
     assert largest_safe_distance_m(RULES) == close(48.56241791801204)
 
 
-@settings(max_examples=60, deadline=None)
-@given(
-    ways=st.lists(
-        trajectories(most_stretches=2, start_s=0.0, end_speed_mps=20.0), min_size=3, max_size=3
-    ),
-    merge_s=st.sampled_from([STREAM, 6.0, math.inf]),
-    other_merge_s=st.sampled_from([STREAM, 3.0, math.inf]),
-)
-def test_unsafe_pairs_are_found_though_far_ones_are_skipped(ways, merge_s, other_merge_s):
-    fleet = fleet_of(
-        (ways[0], STREAM, True), (ways[1], other_merge_s, True), (ways[2], STREAM, True)
+def _random_fleet(rng):
+    """Six vehicles over 700 m that end at v0; merges are to come, past or not planned."""
+    ways, merges_s, lengths_m = [], [], []
+    for _ in range(6):
+        speeds_mps, durations_s = rng.uniform(10.0, 25.0, 3), rng.uniform(0.5, 4.0, 3)
+        stretches = list(zip([*speeds_mps[1:], 20.0], durations_s, strict=True))
+        ways.append(pieces(0.0, rng.uniform(-400.0, 300.0), speeds_mps[0], stretches))
+        merges_s.append(rng.choice([STREAM, STREAM, rng.uniform(1.0, 15.0), math.inf]))
+        lengths_m.append(rng.uniform(4.0, 18.0))
+    return fleet_of(*zip(ways, merges_s, [True] * 6, lengths_m, strict=True))
+
+
+def test_unsafe_pairs_are_found_though_far_ones_are_skipped():
+    rng = np.random.default_rng(3)
+    safe = 0
+    for _ in range(600):
+        fleet, planned = _random_fleet(rng), _random_fleet(rng)
+        from_s = rng.choice([0.0, 2.0])
+        proposal = empty_proposal()
+        proposal.size[0] = 2
+        for entry, row in enumerate((3, 1)):
+            way = planned.pieces[planned.first_piece[row] :][: planned.piece_count[row]]
+            proposal.rows[entry], proposal.piece_count[entry] = row, len(way)
+            proposal.pieces[entry, : len(way)] = way
+            proposal.merge_time_s[entry] = planned.merge_time_s[row]
+        expected = (-1, -1)
+        for row, others in ((1, (0, 2, 4, 5)), (3, (0, 1, 2, 4, 5))):
+            unsafe = [
+                other for other in others if _margin_m(fleet, proposal, row, other, from_s) < 0.1
+            ]
+            expected = (row, unsafe[0]) if unsafe else expected
+        safe += expected == (-1, -1)
+        assert find_unsafe_pair(fleet, proposal, from_s, RULES) == expected
+    assert 100 < safe < 500
+
+
+def _margin_m(fleet, proposal, row, other, from_s):
+    return pair_margin_m(
+        trajectory_under(fleet, proposal, row),
+        fleet.length_m[row],
+        merge_time_under_s(fleet, proposal, row),
+        trajectory_under(fleet, proposal, other),
+        fleet.length_m[other],
+        merge_time_under_s(fleet, proposal, other),
+        from_s,
+        RULES,
     )
-    proposal = empty_proposal()
-    proposal.size[0] = 1
-    proposal.rows[0] = 0
-    proposal.piece_count[0] = len(ways[2])
-    proposal.pieces[0, : len(ways[2])] = ways[2] + np.array([0.0, 25.0, 0.0, 0.0])
-    proposal.merge_time_s[0] = merge_s
-    mine = proposal.pieces[0, : proposal.piece_count[0]]
-    margins_m = [
-        pair_margin_m(mine, 5.0, merge_s, ways[k], 5.0, fleet.merge_time_s[k], 0.0, RULES)
-        for k in (1, 2)
-    ]
-    found = find_unsafe_pair(fleet, proposal, 0.0, RULES)
-    if min(margins_m) >= 0.1:
-        assert found == (-1, -1)
-    elif margins_m[0] < 0.1 - 1e-9:
-        assert found == (0, 1)
-    elif margins_m[1] < 0.1 - 1e-9:
-        assert found == (0, 2)

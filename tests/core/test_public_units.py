@@ -152,7 +152,7 @@ def test_lists_of_equations_are_read_and_ranges_are_not():
 
 def test_every_equation_of_the_paper_is_named_where_it_is_computed():
     named = {number: [] for number in range(1, 49)}
-    improvement = importlib.import_module("coramp.study.statistics")
+    improvement = importlib.import_module("coramp.studies.statistics")
     functions = [
         *((name, f) for name, f in FUNCTIONS if name.startswith("coramp.core.")),
         *((name, f) for name, f in vars(improvement).items() if inspect.isfunction(f)),

@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from coramp.core.separation import smallest_margin_m, smallest_of_quadratic
-from tests.core import SAFETY, close, pieces, sampled_margins, trajectories
+from tests.core import SAFETY, close, pieces, random_pairs, sampled_margins, trajectories
 
 # errors large enough to be seen
 WIDE = SAFETY._replace(positioning_error_m=0.3, clock_error_s=0.05, time_gap_s=0.4)
@@ -74,6 +74,37 @@ def test_allowance_is_no_part_of_the_margin():
     assert smallest_margin_m(front, 5.0, rear, 0.0, math.inf, generous)[0] == close(44.95999988)
 
 
+def test_follower_that_speeds_up_from_equal_speeds_is_nearest_at_the_end():
+    front, rear = pieces(0.0, 50.0, 10.0), pieces(0.0, 0.0, 10.0, [(14.0, 4.0)])
+    # at 4 s: 45 - 8 - 0.04 - 3e-9 * 24 - 14.4^2 / 129.54
+    margin_m, when_s = smallest_margin_m(front, 5.0, rear, 0.0, 4.0, SAFETY)
+    assert (margin_m, when_s) == (close(35.359258844164891), 4.0)
+
+
+def test_pair_that_parts_and_closes_within_one_piece_is_nearest_at_the_end():
+    front, rear = pieces(0.0, 30.0, 20.0, [(10.0, 10.0)]), pieces(0.0, 0.0, 15.0)
+    # at 10 s as far apart as at first, 25 m, less 0.04 + 3e-9 * 25 + 18^2 / 129.54
+    margin_m, when_s = smallest_margin_m(front, 5.0, rear, 0.0, 10.0, SAFETY)
+    assert (margin_m, when_s) == (close(22.458841981507642), 10.0)
+
+
+def _assert_below_every_sample_and_attained(front, rear, start_s, end_s, safety):
+    margin_m, when_s = smallest_margin_m(front, 4.5, rear, start_s, end_s, safety)
+    knots_s = np.concatenate([front[:, 0], rear[:, 0]])
+    knots_s = knots_s[(knots_s >= start_s) & (knots_s <= end_s)]
+    times_s = np.concatenate([np.linspace(start_s, end_s, 3001), knots_s])
+    assert margin_m <= sampled_margins(front, 4.5, rear, times_s, safety).min() + 1e-9
+    assert start_s <= when_s <= end_s
+    there_m = sampled_margins(front, 4.5, rear, np.array([when_s]), safety)[0]
+    assert there_m == pytest.approx(margin_m, abs=1e-9)
+
+
+@pytest.mark.parametrize("safety", [SAFETY, WIDE], ids=["paper", "wide"])
+def test_smallest_margin_of_busy_pairs_is_below_every_sample_and_attained(safety):
+    for front, rear, start_s, lasts_s in random_pairs(1, 200):
+        _assert_below_every_sample_and_attained(front, rear, start_s, start_s + lasts_s, safety)
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     front=trajectories(station_m=30.0),
@@ -83,17 +114,12 @@ def test_allowance_is_no_part_of_the_margin():
     safety=st.sampled_from([SAFETY, WIDE]),
 )
 @example(pieces(0.0, 9.0, 10.0), pieces(0.0, 0.0, 10.0, [(0.0, 5.0)]), 0.0, 5.0, WIDE)
+@example(
+    pieces(0.0, 30.0, 10.0, [(15.0, 2.0)]), pieces(0.0, 0.0, 10.0, [(14.0, 2.0)]), 0.0, 2.0, WIDE
+)
 def test_smallest_margin_is_below_every_sample_and_attained(front, rear, after_s, lasts_s, safety):
     start_s = max(front[0, 0], rear[0, 0]) + after_s
-    end_s = start_s + lasts_s
-    margin_m, when_s = smallest_margin_m(front, 4.5, rear, start_s, end_s, safety)
-    knots_s = np.concatenate([front[:, 0], rear[:, 0]])
-    knots_s = knots_s[(knots_s >= start_s) & (knots_s <= end_s)]
-    times_s = np.concatenate([np.linspace(start_s, end_s, 3001), knots_s])
-    assert margin_m <= sampled_margins(front, 4.5, rear, times_s, safety).min() + 1e-9
-    assert start_s <= when_s <= end_s
-    there_m = sampled_margins(front, 4.5, rear, np.array([when_s]), safety)[0]
-    assert there_m == pytest.approx(margin_m, abs=1e-9)
+    _assert_below_every_sample_and_attained(front, rear, start_s, start_s + lasts_s, safety)
 
 
 @settings(max_examples=50, deadline=None)

@@ -72,7 +72,7 @@ def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
     """Returns one row a vehicle.
 
     Delay is from scheduled entry to exit, less free flow; for a vehicle that is not out when the
-    run is cut off it counts up to then.
+    run is cut off it counts up to then, and is never below 0.
     """
     passages, pieces = outcome.passages, outcome.pieces
     finished = ~np.isnan(passages.exit_s)
@@ -96,7 +96,9 @@ def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
         waiting_s=entry_s - passages.scheduled_s,
         travel_s=travel_s,
         free_flow_s=free_flow_s,
-        delay_s=until_s - passages.scheduled_s - free_flow_s,
+        delay_s=np.maximum(
+            until_s - passages.scheduled_s - free_flow_s, np.where(finished, -np.inf, 0.0)
+        ),
         mean_speed_mps=mean_speed_mps,
         fuel_l=fuel_of_each_l(pieces.first, pieces.rows, until_s),
         finished=finished,

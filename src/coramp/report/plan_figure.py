@@ -22,11 +22,15 @@ def save_plan_figure(planned: PlannedSnapshot, path: Path) -> None:
 
     Raises CorampError where that cannot be written.
     """
-    figure = plan_figure(planned)
+    allowed = "allowed are png, svg and pdf files"
+    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise CorampError(f"--plot: {path}: the ending says no format; {allowed}")
     try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
-        raise CorampError(f"--plot: {path}: {error}; allowed are png, svg and pdf files") from error
+        plan_figure(planned).savefig(path, dpi=150)
+    except OSError as error:
+        raise CorampError(
+            f"--plot: {path}: cannot be written: {error.strerror}; {allowed}"
+        ) from error
 
 
 def plan_figure(planned: PlannedSnapshot) -> Figure:

@@ -254,8 +254,12 @@ class _Files:
         number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
         on_mainline = {lane: lane not in ("ramp_0", "merge_0", ":nose_1_0") for lane in starts_m}
         lane = pl.col("vehicle_lane")
+        written = pl.read_parquet(self._folder / "fcd.parquet")
+        if "vehicle_id" not in written.columns:  # nobody ever drove
+            nothing = np.empty(0)
+            return Samples(nothing.astype(np.int64), nothing.astype(np.bool_), *[nothing] * 3)
         frame = (
-            pl.scan_parquet(self._folder / "fcd.parquet")
+            written.lazy()
             .drop_nulls("vehicle_id")
             .select(
                 vehicle=pl.col("vehicle_id").replace_strict(number, return_dtype=pl.Int64),

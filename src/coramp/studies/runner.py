@@ -11,7 +11,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from coramp.errors import CorampError
 from coramp.running import RunSpec, execute, failed_row
-from coramp.study.store import Part, Store
+from coramp.studies.store import Part, Store
 
 joblib: Any = untyped_joblib
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import polars as pl
 
-from coramp.study.paper_results import FUEL_L, MAINLINE_DELAY_S, RAMP_DELAY_S, Flows, Printed
-from coramp.study.statistics import Estimate, estimate, improvement_rate
-from coramp.study.tables import Table, number, with_interval
+from coramp.studies.paper_results import FUEL_L, MAINLINE_DELAY_S, RAMP_DELAY_S, Flows, Printed
+from coramp.studies.statistics import Estimate, estimate, improvement_rate
+from coramp.studies.tables import Table, number, with_interval
 
 LEAST_BASELINE_S = 0.1
 """A baseline that loses less has no improvement rate."""

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from coramp.study.statistics import Estimate
+from coramp.studies.statistics import Estimate
 
 
 @dataclass(frozen=True)

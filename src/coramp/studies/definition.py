@@ -70,19 +70,30 @@ def load_study(name: str) -> Study:
     return validated(Study, data, label)
 
 
-def expand(study: Study, seeds: int) -> list[RunSpec]:
+def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     """Returns all runs of a study, sorted by their keys; what two grids share is run once.
 
-    Raises CorampError with a message for every combination that cannot be run.
+    Raises CorampError with a message for every combination that cannot be run; ``label`` is the
+    file to name, else it is the study's name.
     """
     if seeds < 1:
         raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
+    label = label or study.name
+    try:
+        read("scenarios", study.scenario)
+    except CorampError as error:
+        raise CorampError(*(f"{label}: scenario: {line}" for line in error.messages)) from None
     specs: dict[str, RunSpec] = {}
     problems: dict[str, None] = {}
     for grid in study.runs:
-        for arguments in _combinations(grid):
+        try:
+            combinations = list(_combinations(grid))
+        except CorampError as error:
+            problems.update(dict.fromkeys(error.messages))
+            continue
+        for arguments in combinations:
             try:
-                first = make_spec(study.scenario, horizon_s=study.horizon_s, **arguments)
+                first = make_spec(study.scenario, horizon_s=study.horizon_s, blamed="", **arguments)
             except CorampError as error:
                 problems.update(dict.fromkeys(error.messages))
                 continue
@@ -90,7 +101,7 @@ def expand(study: Study, seeds: int) -> list[RunSpec]:
                 spec = replace(first, seed=seed)
                 specs.setdefault(spec.run_id, spec)
     if problems:
-        raise CorampError(*(f"{study.name}: {problem}" for problem in problems))
+        raise CorampError(*(f"{label}: {problem}" for problem in problems))
     return sorted(specs.values(), key=sort_key)
 
 

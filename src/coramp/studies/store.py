@@ -18,7 +18,7 @@ from coramp.files import made_folder, read_json, write_json, write_parquet, writ
 from coramp.metrics.schemas import RESULT_VERSION, RUNS, STREAMS
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, versions
-from coramp.study.definition import Study
+from coramp.studies.definition import Study
 
 MARK = "study.json"
 PARTS = "parts"
@@ -90,7 +90,7 @@ class Store:
                 return None
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        if content["run"].get("status") != "ok":
+        if content["run"].get("status") != "ok" or content["run"].get("run_id") != spec.run_id:
             return None
         return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
 

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 import polars as pl
 
 from coramp.running import broken_promises
-from coramp.study.definition import Study
-from coramp.study.paper_layout import paper_tables
-from coramp.study.sensitivity_layout import sensitivity_tables
-from coramp.study.statistics import Estimate, estimate
-from coramp.study.tables import Table, number, with_interval
+from coramp.studies.definition import Study
+from coramp.studies.paper_layout import paper_tables
+from coramp.studies.sensitivity_layout import sensitivity_tables
+from coramp.studies.statistics import Estimate, estimate
+from coramp.studies.tables import Table, number, with_interval
 
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 

@@ -4,8 +4,8 @@ import math
 
 import polars as pl
 
-from coramp.study.statistics import estimate
-from coramp.study.tables import Table, number, with_interval
+from coramp.studies.statistics import estimate
+from coramp.studies.tables import Table, number, with_interval
 
 DELAYS = ("mainline_delay_s", "ramp_delay_s")
 BREAKDOWN_DELAY_S = 5.0
@@ -27,13 +27,14 @@ def _table(strategy: str, group: pl.DataFrame) -> Table:
     pairs = list(flows.iter_rows())
     rows = []
     for (overrides,), setting in group.group_by(["overrides"], maintain_order=True):
-        cells, merging = [], math.nan
+        cells, merging = [], -math.inf
         for mainline, ramp in pairs:
             runs = setting.filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
             cells.append(_delays(runs))
             if runs.height and still_merges(runs):
-                merging = mainline + ramp
-        rows.append((str(overrides or "as in the scenario"), *cells, number(merging, 0)))
+                merging = max(merging, mainline + ramp)
+        largest = number(merging, 0) if math.isfinite(merging) else "-"
+        rows.append((str(overrides or "as in the scenario"), *cells, largest))
     columns = ("setting", *(f"{m:g} + {r:g}" for m, r in pairs), "flow that still merges (veh/h)")
     legend = "Mean delay of mainline / ramp in s, with 95 % intervals over seeds; u: unserved."
     meaning = (
@@ -48,7 +49,7 @@ def still_merges(runs: pl.DataFrame) -> bool:
     delays = [
         estimate(runs[c].drop_nulls().to_list()) for c in ("mainline_delay_s", "ramp_delay_s")
     ]
-    worst_s = max(delay.mean for delay in delays if delay.values)
+    worst_s = max((delay.mean for delay in delays if delay.values), default=0.0)
     return worst_s <= BREAKDOWN_DELAY_S and not runs["unserved"].sum()
 
 

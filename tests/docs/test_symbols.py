@@ -1,0 +1,180 @@
+"""docs/symbols.md names every public quantity, with its unit, and nothing that is gone."""
+
+import importlib
+import math
+import pkgutil
+import re
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Union, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel
+
+import coramp.core
+from coramp.metrics import schemas
+from coramp.run_folder import run_content
+from coramp.running import make_spec
+from coramp.scenario import Scenario
+from coramp.snapshots import Snapshot
+from coramp.studies.definition import Study
+
+PAGE = Path(__file__).parents[2] / "docs" / "symbols.md"
+UNITS = {
+    "veh_h": "veh/h",
+    "mps2": "m/s2",
+    "mps": "m/s",
+    "deg": "deg",
+    "m": "m",
+    "s": "s",
+    "l": "l",
+}
+SEVERITY = "m2/s4"
+EQUATIONS = 48
+FILES = {
+    "vehicles.parquet": schemas.VEHICLES,
+    "trajectories.parquet": schemas.TRAJECTORIES,
+    "decisions.parquet": schemas.DECISIONS,
+    "speeds.parquet": schemas.SPEEDS,
+    "runs.parquet": schemas.RUNS,
+    "streams.parquet": schemas.STREAMS,
+}
+MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}
+
+
+def sections():
+    """Returns each section's table as a list of rows, each a dict by column."""
+    tables, heading, columns = {}, "", []
+    for line in PAGE.read_text(encoding="utf-8").splitlines():
+        if line.startswith("## "):
+            heading, columns = line[3:], []
+            tables[heading] = []
+        elif line.startswith("|") and not line.startswith("|---"):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            if not columns:
+                columns = cells
+            else:
+                tables[heading].append(dict(zip(columns, cells, strict=True)))
+    return tables
+
+
+TABLES = sections()
+
+
+def names(section):
+    return [row["name"].strip("`") for row in TABLES[section]]
+
+
+def inner_model(annotation):
+    """Returns the model in an annotation and what stands for its place: nothing, NAME or N."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation, None
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated or origin in (Union, UnionType):
+        for argument in arguments:
+            found = inner_model(argument)
+            if found is not None:
+                return found
+    if origin is dict and arguments and isinstance(arguments[1], type):
+        return (arguments[1], "NAME") if issubclass(arguments[1], BaseModel) else None
+    if origin is tuple and arguments and isinstance(arguments[0], type):
+        return (arguments[0], "N") if issubclass(arguments[0], BaseModel) else None
+    return None
+
+
+def keys_of(model, prefix=""):
+    """Returns every dotted key of a model with its field."""
+    keys = {}
+    for name, field in model.model_fields.items():
+        found = inner_model(field.annotation)
+        if found is None:
+            keys[prefix + name] = field
+        else:
+            inner, place = found
+            keys.update(keys_of(inner, f"{prefix}{name}." + (f"{place}." if place else "")))
+    return keys
+
+
+def functions_that_cite():
+    """Returns the public functions of the core whose docstring cites an equation."""
+    found = set()
+    for module_info in pkgutil.iter_modules(coramp.core.__path__):
+        module = importlib.import_module(f"coramp.core.{module_info.name}")
+        for name, value in vars(module).items():
+            function = getattr(value, "py_func", value)
+            if getattr(function, "__module__", None) != module.__name__ or name.startswith("_"):
+                continue
+            if not isinstance(value, type) and re.search(r"\(Eq\. \d", function.__doc__ or ""):
+                found.add(f"{module_info.name}.{name}")
+    return found
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_column_of_a_file_stands_there_once_and_in_order(file):
+    assert names(file) == list(FILES[file])
+
+
+def test_every_key_of_run_json_stands_there():
+    assert sorted(names("run.json")) == sorted(run_content(make_spec("paper"), {}))
+
+
+@pytest.mark.parametrize("section", MODELS)
+def test_every_key_of_a_model_stands_there_once(section):
+    assert sorted(names(section)) == sorted(keys_of(MODELS[section]))
+
+
+@pytest.mark.parametrize("section", MODELS)
+def test_defaults_are_those_of_the_models(section):
+    fields = keys_of(MODELS[section])
+    for row in TABLES[section]:
+        name, shown = row["name"].strip("`"), row["default"].strip("`")
+        field = fields[name]
+        default = field.get_default(call_default_factory=True)
+        if field.is_required():
+            assert shown == "required", name
+        elif default is None:
+            assert shown == "derived", name
+        elif isinstance(default, float):
+            assert math.isclose(float(shown), default, rel_tol=1e-12, abs_tol=0.0), name
+        elif isinstance(default, str) and default:
+            assert shown == default, name
+        else:
+            assert shown.replace('"', "'") == repr(default), name
+
+
+@pytest.mark.parametrize("section", [*FILES, *MODELS])
+def test_units_are_those_that_the_names_end_in(section):
+    for row in TABLES[section]:
+        name = row["name"].strip("`").rsplit(".", 1)[-1]
+        expected = next((unit for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
+        if "severity" in name:
+            expected = SEVERITY
+        assert row["unit"] == expected, name
+
+
+def test_every_row_says_what_it_means():
+    for section, rows in TABLES.items():
+        for row in rows:
+            assert row["meaning"], f"{section}: {row}"
+
+
+def test_every_equation_of_the_paper_stands_there():
+    cited = {
+        int(number)
+        for row in TABLES["The paper's symbols"]
+        for number in re.findall(r"\d+", row["Eq."])
+    }
+    assert cited == set(range(1, EQUATIONS + 1))
+
+
+def test_every_function_that_cites_an_equation_stands_there():
+    named = {row["function"].strip("`") for row in TABLES["The paper's symbols"]} - {""}
+    missing = functions_that_cite() - named
+    assert not missing
+
+
+def test_every_function_named_exists():
+    for row in TABLES["The paper's symbols"]:
+        if function := row["function"].strip("`"):
+            module, name = function.split(".")
+            assert callable(getattr(importlib.import_module(f"coramp.core.{module}"), name))

@@ -1,0 +1,64 @@
+"""Studies small enough for tests, and rows of runs made by hand."""
+
+import polars as pl
+
+from coramp.metrics.schemas import RUN_METRICS, RUNS
+
+GRID = """
+name = "grid"
+description = "Small."
+scenario = "paper"
+seeds = 2
+horizon_s = 20.0
+
+[[runs]]
+strategies = ["mainline-priority", "uncontrolled"]
+drivers = ["paper", "fair"]
+mainline_veh_h = [800.0]
+ramp_veh_h = [500.0]
+"""
+
+
+def written(folder, text=GRID, name="s.toml"):
+    """Writes a study and returns its path as text."""
+    path = folder / name
+    path.write_text(text)
+    return str(path)
+
+
+def run_row(
+    strategy="mainline-priority", mainline=800.0, ramp=200.0, seed=1, drivers=None, **figures
+):
+    """Returns a whole row of ``runs.parquet`` with some figures given and the others null."""
+    metrics = dict.fromkeys(RUN_METRICS)
+    for name, kind in RUN_METRICS.items():
+        if kind == pl.Int64:
+            metrics[name] = 0
+    if strategy == "uncontrolled" and drivers is None:
+        drivers = "fair"
+    return {
+        "run_id": f"{strategy}-{drivers}-{mainline}-{ramp}-{seed}",
+        "scenario": "paper",
+        "drivers": drivers,
+        "strategy": strategy,
+        "engine": "sumo",
+        "mainline_veh_h": mainline,
+        "ramp_veh_h": ramp,
+        "seed": seed,
+        "overrides": None,
+        "status": "ok",
+        "error": None,
+        **metrics,
+        "wall_s": 1.0,
+        **figures,
+    }
+
+
+def runs_of(*rows):
+    """Returns rows as the table of a study."""
+    return pl.DataFrame(list(rows), schema=RUNS, orient="row")
+
+
+def apart_from_time(frame):
+    """Returns a table of runs without the time that they took."""
+    return frame.drop("wall_s")
