@@ -1,6 +1,7 @@
 """What notebooks and the command line call: run, study, plan."""
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,16 +15,24 @@ from coramp.files import staged_folder
 from coramp.metrics.tables import Row
 from coramp.planning import PlannedSnapshot, plan_snapshot
 from coramp.run_folder import MARK, run_content, write_run
-from coramp.running import RunSpec, broken_promises, execute, make_spec
+from coramp.running import RunSpec, broken_promises, engine_checked, execute, make_spec
 from coramp.snapshots import load_snapshot
-from coramp.studies.definition import expand, load_study
-from coramp.studies.runner import Progress, run_missing, usable_cores
+from coramp.studies.breakdown import bisections
+from coramp.studies.cluster import connected
+from coramp.studies.definition import Study, count_runs, expand, load_study, sort_key
+from coramp.studies.outlook import Outlook, outlook_of
+from coramp.studies.runner import ALL_WORKERS, Progress, run_missing, run_searches, usable_cores
+from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
 from coramp.studies.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+MANY_RUNS = 100_000
+"""More runs than this are asked about first."""
 
 
 @dataclass(frozen=True)
@@ -187,28 +196,77 @@ def study(
     *,
     seeds: int | None = None,
     jobs: int | None = None,
+    cluster: str | None = None,
+    engine: str | None = None,
     out: str | Path | None = None,
+    many: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> StudyResult:
     """Runs what a study still lacks and returns all of it.
 
     ``name`` is a built-in study or a TOML file; ``out`` is where it is kept (default:
     ``out/NAME``), and a study that was interrupted goes on from there. ``jobs`` processes work at
-    a time (default: one a core). ``progress`` is called at the start and after every run. Raises
-    CorampError for a study that cannot be run; runs that fail are rows of the result.
+    a time (default: one a core), or the workers of a Dask ``cluster``. ``engine`` moves the
+    cooperative runs to another engine. ``many`` allows more than a hundred thousand runs.
+    ``progress`` is called at the start and after every run. Raises CorampError for a study that
+    cannot be run; runs that fail are rows of the result.
     """
-    definition = load_study(name)
+    definition, seeds = _defined(name, seeds, engine, many)
     jobs = usable_cores() if jobs is None else jobs
     if jobs < 1:
         raise CorampError(f"--jobs: {jobs} is too small; allowed is at least 1")
-    specs = expand(definition, definition.seeds if seeds is None else seeds, name)
-    folder = Path(out) if out is not None else Path("out") / definition.name
-    store = Store(folder, definition)
-    parts = run_missing(store, specs, jobs, progress or (lambda _: None))
-    runs, streams = store.frames(parts)
+    specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
+    report = progress or (lambda _: None)
+    with connected(cluster) if cluster is not None else nullcontext():
+        store = Store(_folder_of(definition, out), definition)
+        jobs = ALL_WORKERS if cluster is not None else jobs
+        run_missing(store, specs, jobs, report)
+        searched = run_searches(store, searches, jobs, report)
+    everything = {spec.run_id: spec for spec in (*specs, *searched)}
+    runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
     tables = summary_tables(definition, runs)
     store.write_tables(runs, streams, to_markdown(definition, tables))
-    return StudyResult(folder, runs, streams, tuple(tables))
+    if definition.layout == "capacity":
+        from coramp.report.capacity_figure import save_capacity_figure
+
+        save_capacity_figure(runs, store.folder / "capacity.png")
+    return StudyResult(store.folder, runs, streams, tuple(tables))
+
+
+def outlook(
+    name: str,
+    *,
+    seeds: int | None = None,
+    jobs: int | None = None,
+    engine: str | None = None,
+    out: str | Path | None = None,
+    many: bool = False,
+) -> Outlook:
+    """Returns how much of a study is done and how long the rest should take; runs nothing."""
+    definition, seeds = _defined(name, seeds, engine, many)
+    specs = expand(definition, seeds, name)
+    bisections(definition, seeds, name)
+    at_most = count_runs(definition, seeds)
+    folder = _folder_of(definition, out)
+    store = Store(folder, definition) if (folder / STUDY_MARK).exists() else None
+    return outlook_of(store, folder, specs, at_most, jobs or usable_cores())
+
+
+def _defined(name: str, seeds: int | None, engine: str | None, many: bool) -> tuple[Study, int]:
+    definition = load_study(name)
+    if engine is not None:
+        definition = definition.on_engine(engine_checked(engine))
+    seeds = definition.seeds if seeds is None else seeds
+    runs = count_runs(definition, max(1, seeds))
+    if runs > MANY_RUNS and not many:
+        raise CorampError(
+            f"{name}: has {runs} runs; add --yes to run so many, or lower --seeds or the flows"
+        )
+    return definition, seeds
+
+
+def _folder_of(definition: Study, out: str | Path | None) -> Path:
+    return Path(out) if out is not None else Path("out") / definition.name
 
 
 def plan(snapshot: str, strategy: str = "mainline-priority") -> PlanResult:

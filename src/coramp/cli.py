@@ -147,15 +147,52 @@ def study(
     name: Annotated[str, typer.Argument(help="A built-in study or a TOML file.")],
     seeds: Annotated[int | None, typer.Option(help="Seeds 1 to N (default: the study's).")] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786."),
+    ] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="What moves cooperative vehicles: sumo or exact.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder (default: out/NAME).")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what would run, and for how long.")
+    ] = False,
+    status: Annotated[bool, typer.Option("--status", help="Only say what is done.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Run even very many runs.")] = False,
     json: Json = False,
 ) -> None:
     """Run a grid of runs; go on where an earlier start left off."""
+    from coramp.api import outlook
     from coramp.api import study as run_study
-    from coramp.console import StudyProgress, counted, print_json, print_study, study_json
+    from coramp.console import (
+        StudyProgress,
+        counted,
+        outlook_json,
+        print_json,
+        print_outlook,
+        print_study,
+        study_json,
+    )
 
+    if dry_run or status:
+        ahead = outlook(name, seeds=seeds, jobs=jobs, engine=engine, out=out, many=yes)
+        if json:
+            print_json(outlook_json(ahead))
+        else:
+            print_outlook(ahead)
+        return
     with StudyProgress() as progress:
-        result = run_study(name, seeds=seeds, jobs=jobs, out=out, progress=progress)
+        result = run_study(
+            name,
+            seeds=seeds,
+            jobs=jobs,
+            cluster=cluster,
+            engine=engine,
+            out=out,
+            many=yes,
+            progress=progress,
+        )
     if json:
         print_json(study_json(result))
     else:

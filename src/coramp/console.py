@@ -1,5 +1,6 @@
 """How results look on a terminal: tables on stdout, progress on stderr, JSON for machines."""
 
+import dataclasses
 import json
 import sys
 import time
@@ -19,6 +20,7 @@ from coramp.explanation import Quantity
 from coramp.metrics.tables import Row
 from coramp.running import finite_or_none
 from coramp.story import Story, told
+from coramp.studies.outlook import Outlook
 from coramp.studies.runner import Progress as StudyState
 from coramp.studies.tables import Table, number
 
@@ -243,6 +245,32 @@ def print_study(result: StudyResult) -> None:
     for table in result.tables:
         print_table(table)
     print(f"Results are in {result.folder}: runs.parquet, streams.parquet, tables.md.")
+
+
+def print_outlook(ahead: Outlook) -> None:
+    """Prints how far a study is, and how long the rest should take."""
+    rows = [
+        ("folder", str(ahead.folder)),
+        ("runs", str(ahead.runs)),
+        ("done", str(ahead.done)),
+        ("failed, to run again", str(ahead.failed)),
+        ("damaged, to run again", str(ahead.damaged)),
+        ("to run", str(ahead.missing)),
+    ]
+    if ahead.searches_at_most:
+        rows.append(("more for breakdown searches, at most", str(ahead.searches_at_most)))
+    rows.append(("seconds for these, about", f"{ahead.expected_s:.0f} (jobs: {ahead.jobs})"))
+    print_table(Table("Outlook", ("what", "value"), tuple(rows)))
+
+
+def outlook_json(ahead: Outlook) -> Row:
+    """Returns an outlook as plain data."""
+    return {
+        "kind": "outlook",
+        **dataclasses.asdict(ahead),
+        "folder": str(ahead.folder),
+        "missing": ahead.missing,
+    }
 
 
 def study_json(result: StudyResult) -> Row:

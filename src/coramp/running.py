@@ -96,8 +96,7 @@ def make_spec(
     Errors name the options of the command line, or else say ``blamed`` for all of them.
     """
     chosen = strategy_named(strategy)
-    if engine not in ENGINES:
-        raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
+    engine_checked(engine)
     if engine == "exact" and not chosen.cooperative:
         raise CorampError(
             f"engine: exact has no drivers for {strategy}; choose sumo, or a cooperative strategy"
@@ -119,6 +118,13 @@ def make_spec(
     if chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def engine_checked(engine: str) -> str:
+    """Returns the name of an engine; raises CorampError if there is none such."""
+    if engine not in ENGINES:
+        raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
+    return engine
 
 
 def _as_floats(named: Mapping[str, Any]) -> dict[str, Any]:

@@ -217,6 +217,18 @@ def test_vehicle_moved_without_its_leader_is_found_unsafe():
     assert find_unsafe_pair(fleet, _shift(fleet, 2, 0.0, 10.0, 4.8), 0.0, RULES) == (-1, -1)
 
 
+def test_ramp_pair_that_is_far_apart_only_later_is_found_unsafe():
+    # they overlap now, and are 100 m apart when the slower one merges
+    slow = pieces(0.0, -100.0, 10.0, [(10.0, 10.0), (20.0, 5.0)])
+    fast = pieces(0.0, -96.0, 20.0)
+    fleet = fleet_of((slow, math.inf, True), (fast, 5.0, True))
+    proposal = empty_proposal()
+    proposal.size[0], proposal.rows[0], proposal.merge_time_s[0] = 1, 0, 15.0
+    proposal.piece_count[0] = len(slow)
+    proposal.pieces[0, : len(slow)] = slow
+    assert find_unsafe_pair(fleet, proposal, 0.0, RULES) == (0, 1)
+
+
 def test_no_safe_distance_exceeds_the_largest():
     # fastest 22 m/s, 79.2 km/h: 0.04 + 3e-9 * 44 + 6272.64 / 129.54 + 0.1
     assert largest_safe_distance_m(RULES) == close(48.56241791801204)

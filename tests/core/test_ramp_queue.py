@@ -135,10 +135,56 @@ def test_place_ahead_must_not_touch_who_is_behind(behind_m, possible):
     # braking for the leader brings the subject back onto a follower that is near
     leader = stopping(-110.0, -1.0, 12.0)
     fleet = fleet_of(
-        (leader, UNDECIDED, True),
-        (stopping(-120.0, -20.0), UNDECIDED, True),
         (stopping(behind_m, -26.0), UNDECIDED, True),
+        (stopping(-120.0, -20.0), UNDECIDED, True),
+        (leader, UNDECIDED, True),
     )
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 1, -6.2, 0.0, RULES) is possible
     assert proposal.size[0] == int(possible)
+
+
+def test_place_ahead_keeps_the_commitment_s_own_pace():
+    # 1 m/s2 where a new approach would take 1.5
+    gently = pieces(0.0, -200.0, 12.0, [(16.0, 4.0), (16.0, 4.0), (0.0, 6.4)])
+    fleet = fleet_of((gently, UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_place_ahead(fleet, proposal, 0, -10.0, 0.0, RULES)
+    expected = [
+        [0.0, -200.0, 12.0, 1.0],
+        [4.0, -144.0, 16.0, 0.0],
+        [9.175, -61.2, 16.0, -2.5],
+        [15.575, -10.0, 0.0, 0.0],
+    ]
+    assert proposal.size[0] == 1
+    assert _proposed(proposal) == close(np.array(expected))
+
+
+def test_place_that_is_taken_is_not_to_be_had():
+    fleet = fleet_of(
+        (stopping(-100.0, -1.0), UNDECIDED, True), (stopping(-160.0, -20.0), UNDECIDED, True)
+    )
+    for stop_m, free in ((-1.0, False), (-6.1399, False), (-6.14, True)):
+        for propose in (propose_stop, propose_place_ahead):
+            proposal = empty_proposal()
+            assert propose(fleet, proposal, 1, stop_m, 0.0, RULES) is free
+            assert proposal.size[0] == int(free)
+
+
+def test_standing_vehicle_beyond_a_merging_one_is_in_the_way():
+    merging = pieces(0.0, -140.0, 16.0, [(16.0, 8.75), (20.0, 2.0)])
+    fleet = fleet_of(
+        (pieces(0.0, -40.0, 0.0), UNDECIDED, True),
+        (merging, 10.75, True),
+        (pieces(0.0, -160.0, 16.0), UNDECIDED, True),
+    )
+    assert not propose_stop(fleet, empty_proposal(), 2, -30.0, 0.0, RULES)
+    assert propose_stop(fleet, empty_proposal(), 2, -46.0, 0.0, RULES)
+
+
+def test_merging_vehicle_behind_is_not_the_concern_of_the_one_ahead():
+    behind = pieces(0.0, -166.0, 16.0, [(16.0, 10.375), (20.0, 2.0)])
+    fleet = fleet_of((behind, 12.375, True), (pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_stop(fleet, proposal, 1, -10.0, 0.0, RULES)
+    assert _proposed(proposal)[0, 3] == 0.0

@@ -1,5 +1,7 @@
 """Commands to SUMO: a step-by-step walk of what they drive stays on the plan."""
 
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -87,7 +89,7 @@ def test_no_such_speed_goes_to_sumo(speed_mps):
 
 
 def test_one_simulation_a_process(monkeypatch):
-    monkeypatch.setattr(Session, "_running", True)
+    monkeypatch.setattr(Session, "_owner", threading.get_ident())
     with pytest.raises(CorampError, match="one simulation a process"):
         Session([], STEP_S)
 

@@ -293,13 +293,12 @@ def test_a_run_that_kills_its_process_fails_alone(monkeypatch):
     monkeypatch.setattr(coramp.studies.runner, "DEATHS_BEFORE_ISOLATION", 1)
     good = make_spec("paper", horizon_s=5.0)
     store = Memory()
-    parts = run_missing(store, [Deadly(), good], 2, lambda state: None)
-    assert [(p.run["run_id"], p.run["status"]) for p in parts] == [
-        ("deadly", "failed"),
-        (good.run_id, "ok"),
-    ]
-    assert parts[0].run["error"] == "the process that ran it died"
-    assert set(store.written) == {"deadly", good.run_id}
+    run_missing(store, [Deadly(), good], 2, lambda state: None)
+    assert {name: part.run["status"] for name, part in store.written.items()} == {
+        "deadly": "failed",
+        good.run_id: "ok",
+    }
+    assert store.written["deadly"].run["error"] == "the process that ran it died"
 
 
 LONG_GRID = GRID.replace("horizon_s = 20.0", "horizon_s = 120.0").replace("seeds = 2", "seeds = 3")

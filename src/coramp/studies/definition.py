@@ -1,5 +1,6 @@
 """Studies: a grid of runs, as validated TOML."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
@@ -24,7 +25,7 @@ class Grid(Model):
     Flows are those of ``mainline_veh_h`` by those of ``ramp_veh_h``, or the pairs of
     ``flows_veh_h``.
     ``set`` gives lists of values for dotted keys of the scenario. ``drivers`` count only for
-    strategies that leave vehicles to their drivers.
+    strategies that leave vehicles to their drivers, whose engine is always sumo.
     """
 
     strategies: Names
@@ -52,6 +53,45 @@ class Grid(Model):
         return self.flows_veh_h or tuple(product(self.mainline_veh_h, self.ramp_veh_h))
 
 
+class Search(Model):
+    """Searches for the mainline flow at which each combination breaks down, seed by seed.
+
+    By bisection between two flows, in steps of the resolution, at each ramp flow.
+    """
+
+    strategies: Names
+    ramp_veh_h: Annotated[tuple[Flow, ...], Field(strict=False, min_length=1)]
+    mainline_from_veh_h: Flow
+    mainline_to_veh_h: Flow
+    resolution_veh_h: Annotated[float, Field(gt=0.0)]
+    drivers: Names = (DEFAULT_DRIVERS,)
+    engine: str = "sumo"
+    set: dict[str, Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]] = Field(
+        default={}
+    )
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Self:
+        if self.mainline_from_veh_h >= self.mainline_to_veh_h:
+            raise ValueError(
+                f"searches: mainline_to_veh_h: {self.mainline_to_veh_h:g} is not above "
+                f"mainline_from_veh_h; allowed is above {self.mainline_from_veh_h:g} veh/h"
+            )
+        return self
+
+    @property
+    def steps(self) -> int:
+        """How many steps of the resolution lie between the two flows."""
+        return math.ceil(
+            (self.mainline_to_veh_h - self.mainline_from_veh_h) / self.resolution_veh_h
+        )
+
+    def flow_veh_h(self, step: int) -> float:
+        """Returns the mainline flow of a step; the last is the upper end."""
+        flow = self.mainline_from_veh_h + step * self.resolution_veh_h
+        return min(self.mainline_to_veh_h, flow)
+
+
 class Study(Model):
     """A named set of grids on one scenario; ``layout`` says which tables sum it up."""
 
@@ -59,9 +99,25 @@ class Study(Model):
     description: str = ""
     scenario: str
     seeds: Annotated[int, Field(ge=1, le=100000)] = 3
-    layout: Literal["plain", "paper", "sensitivity"] = "plain"
+    layout: Literal["plain", "paper", "sensitivity", "capacity"] = "plain"
     horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
-    runs: Annotated[tuple[Grid, ...], Field(strict=False, min_length=1)]
+    runs: Annotated[tuple[Grid, ...], Field(strict=False)] = ()
+    searches: Annotated[tuple[Search, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _asks_something(self) -> Self:
+        if not self.runs and not self.searches:
+            raise ValueError("runs: there are none; allowed is at least one of runs and searches")
+        return self
+
+    def on_engine(self, engine: str) -> "Study":
+        """Returns the study with its cooperative runs on another engine."""
+        return self.model_copy(
+            update={
+                "runs": tuple(g.model_copy(update={"engine": engine}) for g in self.runs),
+                "searches": tuple(s.model_copy(update={"engine": engine}) for s in self.searches),
+            }
+        )
 
 
 def load_study(name: str) -> Study:
@@ -76,13 +132,8 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     Raises CorampError with a message for every combination that cannot be run; ``label`` is the
     file to name, else it is the study's name.
     """
-    if seeds < 1:
-        raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
     label = label or study.name
-    try:
-        read("scenarios", study.scenario)
-    except CorampError as error:
-        raise CorampError(*(f"{label}: scenario: {line}" for line in error.messages)) from None
+    _check_source(study, seeds, label)
     specs: dict[str, RunSpec] = {}
     problems: dict[str, None] = {}
     for grid in study.runs:
@@ -93,7 +144,7 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
             continue
         for arguments in combinations:
             try:
-                first = make_spec(study.scenario, horizon_s=study.horizon_s, blamed="", **arguments)
+                first = spec_of(study, arguments)
             except CorampError as error:
                 problems.update(dict.fromkeys(error.messages))
                 continue
@@ -105,23 +156,56 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     return sorted(specs.values(), key=sort_key)
 
 
+def _check_source(study: Study, seeds: int, label: str) -> None:
+    if seeds < 1:
+        raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
+    try:
+        read("scenarios", study.scenario)
+    except CorampError as error:
+        raise CorampError(*(f"{label}: scenario: {line}" for line in error.messages)) from None
+
+
+def spec_of(study: Study, arguments: dict[str, Any]) -> RunSpec:
+    """Returns the specification of one run of a study, with the first seed."""
+    return make_spec(study.scenario, horizon_s=study.horizon_s, blamed="", **arguments)
+
+
 def _combinations(grid: Grid) -> Iterator[dict[str, Any]]:
-    keys = sorted(grid.set)
-    for strategy in grid.strategies:
+    for variant in variants(grid):
+        for mainline, ramp in grid.flows:
+            yield {**variant, "mainline_veh_h": mainline, "ramp_veh_h": ramp}
+
+
+def variants(asked: Grid | Search) -> Iterator[dict[str, Any]]:
+    """Yields every combination of strategy, drivers and settings, flows left out.
+
+    What drivers are to drive runs in SUMO, whatever the engine for the others.
+    """
+    keys = sorted(asked.set)
+    for strategy in asked.strategies:
         cooperative = strategy_named(strategy).cooperative
-        for drivers, (mainline, ramp), *values in product(
-            (None,) if cooperative else grid.drivers,
-            grid.flows,
-            *(grid.set[key] for key in keys),
+        for drivers, *values in product(
+            (None,) if cooperative else asked.drivers,
+            *(asked.set[key] for key in keys),
         ):
             yield {
                 "strategy": strategy,
-                "engine": grid.engine,
+                "engine": asked.engine if cooperative else "sumo",
                 "drivers": drivers,
-                "mainline_veh_h": mainline,
-                "ramp_veh_h": ramp,
                 "overrides": dict(zip(keys, values, strict=True)),
             }
+
+
+def count_runs(study: Study, seeds: int) -> int:
+    """Returns how many runs a study has at most."""
+    grids = sum(len(grid.flows) * sum(1 for _ in variants(grid)) for grid in study.runs)
+    searches = sum(
+        len(search.ramp_veh_h)
+        * sum(1 for _ in variants(search))
+        * (2 + max(0, search.steps - 1).bit_length())
+        for search in study.searches
+    )
+    return (grids + searches) * seeds
 
 
 def sort_key(spec: RunSpec) -> tuple[Any, ...]:

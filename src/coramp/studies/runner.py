@@ -10,11 +10,16 @@ import joblib as untyped_joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from coramp.errors import CorampError
+from coramp.metrics.tables import Row
 from coramp.running import RunSpec, execute, failed_row
+from coramp.studies.breakdown import Bisection
+from coramp.studies.definition import sort_key
 from coramp.studies.store import Part, Store
 
 joblib: Any = untyped_joblib
 
+ALL_WORKERS = -1
+"""As a number of jobs: whatever the cluster has."""
 DEATHS_BEFORE_ISOLATION = 3
 """How often workers may die before each remaining run gets a worker of its own."""
 
@@ -54,23 +59,52 @@ def execute_part(spec: RunSpec) -> Part:
 
 def run_missing(
     store: Store, specs: Sequence[RunSpec], jobs: int, report: Callable[[Progress], None]
-) -> list[Part]:
-    """Returns the parts of all runs, in their order, running those that the store lacks.
+) -> None:
+    """Runs what the store lacks of the given runs, and keeps each result as it comes.
 
-    ``report`` is called at the start and after every run.
+    ``report`` is called at the start and after every run. ``jobs`` counts processes of this
+    machine; within ``cluster.connected`` the cluster's workers run instead.
     """
-    parts = {spec.run_id: store.read(spec) for spec in specs}
-    missing = [spec for spec in specs if parts[spec.run_id] is None]
+    missing = [spec for spec in specs if store.read(spec) is None]
     damaged = sum(store.is_damaged(spec) for spec in missing)
     skipped = len(specs) - len(missing)
     failed = 0
     report(Progress(len(specs), 0, skipped, 0, damaged))
     for done, (spec, part) in enumerate(_results(missing, jobs), 1):
         store.write(spec, part)
-        parts[spec.run_id] = part
         failed += part.run["status"] == "failed"
         report(Progress(len(specs), done, skipped, failed, damaged, part))
-    return [part for part in (parts[spec.run_id] for spec in specs) if part is not None]
+
+
+def run_searches(
+    store: Store,
+    searches: Sequence[Bisection],
+    jobs: int,
+    report: Callable[[Progress], None],
+) -> list[RunSpec]:
+    """Runs searches to their ends, in rounds of one run each; returns the runs that they took."""
+    taken: dict[str, RunSpec] = {}
+    results: dict[str, Row] = {}
+
+    def result_of(spec: RunSpec) -> Row | None:
+        taken.setdefault(spec.run_id, spec)
+        if spec.run_id not in results:
+            part = store.stored(spec) if spec.run_id in ran else store.read(spec)
+            if part is None:
+                return None
+            results[spec.run_id] = part.run
+        return results[spec.run_id]
+
+    ran: set[str] = set()
+    open_searches = list(searches)
+    while open_searches:
+        asked = [(search, search.next_run(result_of)) for search in open_searches]
+        open_searches = [search for search, spec in asked if spec is not None]
+        round_of = {spec.run_id: spec for _, spec in asked if spec is not None}
+        if round_of:
+            run_missing(store, list(round_of.values()), jobs, report)
+            ran |= round_of.keys()
+    return sorted(taken.values(), key=sort_key)
 
 
 def _results(specs: Sequence[RunSpec], jobs: int) -> Iterator[tuple[RunSpec, Part]]:
@@ -90,7 +124,7 @@ def _results(specs: Sequence[RunSpec], jobs: int) -> Iterator[tuple[RunSpec, Par
             continue
     for spec in left.values():
         try:
-            (part,) = _in_workers([spec], max(2, jobs))
+            (part,) = _in_workers([spec], max(2, jobs) if jobs != ALL_WORKERS else jobs)
         except TerminatedWorkerError:
             part = Part(failed_row(spec, "the process that ran it died", 0.0), [])
         yield spec, part

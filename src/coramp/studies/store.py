@@ -6,8 +6,9 @@ A part carries a checksum, so that what was interrupted or damaged is found and 
 import hashlib
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from coramp.metrics.tables import Row
 from coramp.running import RunSpec, versions
 from coramp.studies.definition import Study
 
+ROWS_AT_A_TIME = 1000
+"""Runs that are held in memory as rows while the tables are made."""
 MARK = "study.json"
 PARTS = "parts"
 
@@ -82,27 +85,26 @@ class Store:
         """Returns where the part of a run lies."""
         return self.folder / PARTS / f"{spec.run_id}.json"
 
-    def read(self, spec: RunSpec) -> Part | None:
-        """Returns the part of a run, None if it is missing or damaged or the run had failed."""
+    def stored(self, spec: RunSpec) -> Part | None:
+        """Returns the part of a run, a failed one too, None if it is missing or damaged."""
         try:
             content = json.loads(self.part_path(spec).read_text(encoding="utf-8"))
             if content["sha256"] != _checksum(content["run"], content["streams"]):
                 return None
+            if content["run"]["run_id"] != spec.run_id:
+                return None
         except (OSError, ValueError, KeyError, TypeError):
-            return None
-        if content["run"].get("status") != "ok" or content["run"].get("run_id") != spec.run_id:
             return None
         return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
 
+    def read(self, spec: RunSpec) -> Part | None:
+        """Returns the part of a run, None if it is missing or damaged or the run had failed."""
+        part = self.stored(spec)
+        return part if part is not None and part.run["status"] == "ok" else None
+
     def is_damaged(self, spec: RunSpec) -> bool:
         """Returns whether there is a part that cannot be used."""
-        path = self.part_path(spec)
-        if not path.exists() or self.read(spec) is not None:
-            return False
-        try:
-            return bool(json.loads(path.read_text(encoding="utf-8"))["run"]["status"] != "failed")
-        except (OSError, ValueError, KeyError, TypeError):
-            return True
+        return self.part_path(spec).exists() and self.stored(spec) is None
 
     def write(self, spec: RunSpec, part: Part) -> None:
         """Writes the part of a run."""
@@ -110,12 +112,22 @@ class Store:
         content = {"run": run, "streams": streams, "sha256": _checksum(run, streams)}
         write_json(self.part_path(spec), content)
 
+    def parts(self, specs: Iterable[RunSpec]) -> Iterator[Part]:
+        """Yields what there is of the given runs, failed ones too, in their order."""
+        for spec in specs:
+            part = self.stored(spec)
+            if part is not None:
+                yield part
+
     def frames(self, parts: Iterable[Part]) -> tuple[pl.DataFrame, pl.DataFrame]:
         """Returns the tables of runs and of streams, in the order of the parts."""
-        parts = list(parts)
-        runs = pl.DataFrame([part.run for part in parts], schema=RUNS, orient="row")
-        rows = [row for part in parts for row in part.streams]
-        return runs, pl.DataFrame(rows, schema=STREAMS, orient="row")
+        runs, streams = [pl.DataFrame(schema=RUNS)], [pl.DataFrame(schema=STREAMS)]
+        left = iter(parts)
+        while some := list(islice(left, ROWS_AT_A_TIME)):
+            runs.append(pl.DataFrame([p.run for p in some], schema=RUNS, orient="row"))
+            rows = [row for part in some for row in part.streams]
+            streams.append(pl.DataFrame(rows, schema=STREAMS, orient="row"))
+        return pl.concat(runs, rechunk=True), pl.concat(streams, rechunk=True)
 
     def write_tables(self, runs: pl.DataFrame, streams: pl.DataFrame, markdown: str) -> None:
         """Writes ``runs.parquet``, ``streams.parquet`` and ``tables.md``."""

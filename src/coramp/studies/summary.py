@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import polars as pl
 
 from coramp.running import broken_promises
+from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
@@ -23,6 +24,8 @@ def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
         tables += paper_tables(good)
     if study.layout == "sensitivity":
         tables += sensitivity_tables(good)
+    if study.layout == "capacity":
+        tables += capacity_tables(good)
     return [*tables, overview(good), promises(runs)]
 
 

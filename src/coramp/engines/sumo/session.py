@@ -6,6 +6,7 @@ are at step n - 1. What is commanded then governs the way from there to step n.
 
 import math
 import os
+import threading
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -33,21 +34,25 @@ at once. That more than halves the time of a simulation step.
 class Session:
     """A running simulation; use it as a context manager."""
 
-    _running = False
+    _free = threading.Lock()
+    _owner: int | None = None
 
     def __init__(self, options: Sequence[str], step_s: float, gui: bool = False) -> None:
-        if Session._running:
+        """Starts SUMO; libsumo runs one simulation a process, so other threads wait for it."""
+        if Session._owner == threading.get_ident():
             raise CorampError("SUMO: one simulation a process; the other one still runs")
         if gui and not os.environ.get("DISPLAY"):
             raise CorampError("--gui: there is no screen (DISPLAY is not set); run without --gui")
         self._step_s = step_s
         program = sumo_binary("sumo-gui" if gui else "sumo")
         extra = ("--start", "--quit-on-end") if gui else ()
+        Session._free.acquire()
         try:
             libsumo.start([program, *options, "--step-length", repr(step_s), *extra])
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            Session._free.release()
             raise CorampError(f"SUMO: {error}") from error
-        Session._running = True
+        Session._owner = threading.get_ident()
 
     def __enter__(self) -> Self:
         return self
@@ -58,8 +63,9 @@ class Session:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        Session._running = False
         libsumo.close()
+        Session._owner = None
+        Session._free.release()
 
     def step_to(self, step: int) -> None:
         """Executes all steps before ``step``."""

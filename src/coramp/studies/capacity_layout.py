@@ -1,0 +1,115 @@
+"""Where each strategy breaks down: the mainline flow by ramp flow, with its interval over seeds."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import polars as pl
+
+from coramp.studies.breakdown import BREAKDOWN_DELAY_S, broke_down
+from coramp.studies.statistics import Estimate, estimate
+from coramp.studies.tables import Table, number, with_interval
+
+
+@dataclass(frozen=True)
+class Breakdown:
+    """Where one combination breaks down at one ramp flow, over the seeds.
+
+    ``flows`` are the lowest mainline flows (veh/h) that broke down, one a seed; ``above`` counts
+    the seeds with which even the highest flow held, ``below`` those with which the lowest broke.
+    """
+
+    strategy: str
+    drivers: str | None
+    overrides: str | None
+    ramp_veh_h: float
+    flows: tuple[float, ...]
+    above: int
+    below: int
+    lowest_veh_h: float
+    highest_veh_h: float
+
+    @property
+    def estimate(self) -> Estimate:
+        """The mean breakdown flow with its interval, where it lies within the range."""
+        return estimate(self.flows)
+
+    @property
+    def name(self) -> str:
+        """The combination in words."""
+        gap = (self.overrides or "").removeprefix("safety.time_gap_s=")
+        who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
+        if self.drivers:
+            return who
+        return f"{who}, {gap} s" if gap else f"{who}, Eq. 1"
+
+
+def breakdowns(good: pl.DataFrame) -> list[Breakdown]:
+    """Returns the breakdown of each combination at each ramp flow."""
+    keys = ["strategy", "drivers", "overrides", "ramp_veh_h"]
+    return [
+        _breakdown(str(key[0]), key[1], key[2], float(key[3]), group)
+        for key, group in good.group_by(keys, maintain_order=True)
+    ]
+
+
+def _breakdown(
+    strategy: str, drivers: str | None, overrides: str | None, ramp: float, group: pl.DataFrame
+) -> Breakdown:
+    low, high = _range(group)
+    flows, above, below = [], 0, 0
+    for _, runs in group.group_by("seed", maintain_order=True):
+        broken = min(_broken_flows(runs), default=math.inf)
+        if broken == low:
+            below += 1
+        elif broken == math.inf:
+            above += 1
+        else:
+            flows.append(broken)
+    return Breakdown(strategy, drivers, overrides, ramp, tuple(flows), above, below, low, high)
+
+
+def _range(group: pl.DataFrame) -> tuple[float, float]:
+    flows = group["mainline_veh_h"]
+    return float(min(flows)), float(max(flows))
+
+
+def _broken_flows(runs: pl.DataFrame) -> Iterator[float]:
+    for run in runs.iter_rows(named=True):
+        if broke_down(run):
+            yield run["mainline_veh_h"]
+
+
+def capacity_tables(good: pl.DataFrame) -> list[Table]:
+    """Returns one row a combination: its breakdown flow at each ramp flow."""
+    found = breakdowns(good)
+    ramps = sorted({b.ramp_veh_h for b in found})
+    rows = []
+    for name in dict.fromkeys(b.name for b in found):
+        cells = {b.ramp_veh_h: _cell(b) for b in found if b.name == name}
+        rows.append((name, *(cells.get(ramp, "-") for ramp in ramps)))
+    columns = ("strategy, time gap", *(f"ramp {ramp:g}" for ramp in ramps))
+    meaning = (
+        "Mainline flow (veh/h) from which on a stream loses more than "
+        f"{BREAKDOWN_DELAY_S:g} s on average or anyone is left, by bisection for each seed: mean "
+        "with 95 % interval over seeds. Above: not even at the highest flow tried; at or below: "
+        "already at the lowest. Bisection takes it that what broke down at a flow does so at all "
+        "higher ones."
+    )
+    return [Table("Breakdown flow on the mainline (veh/h)", columns, tuple(rows), (meaning,))]
+
+
+def _cell(found: Breakdown) -> str:
+    parts = []
+    if found.flows:
+        parts.append(with_interval(found.estimate, 0))
+    if found.above:
+        parts.append(f"above {number(found.highest_veh_h, 0)}{_seeds(found, found.above)}")
+    if found.below:
+        parts.append(f"at or below {number(found.lowest_veh_h, 0)}{_seeds(found, found.below)}")
+    return "; ".join(parts)
+
+
+def _seeds(found: Breakdown, number_of_seeds: int) -> str:
+    everyone = len(found.flows) + found.above + found.below
+    return "" if number_of_seeds == everyone else f" ({number_of_seeds} of {everyone} seeds)"

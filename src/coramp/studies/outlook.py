@@ -1,0 +1,69 @@
+"""What a study still has to do, and how long that should take."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+from coramp.running import RunSpec
+from coramp.studies.store import Store
+
+SECONDS_PER_VEHICLE = {("exact", False): 5e-5, ("sumo", False): 8e-4, ("sumo", True): 2e-3}
+"""By engine, and whether drivers drive: of runs on the machine of docs/performance.md."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """How far a study is.
+
+    ``searches_at_most`` counts the runs that searches for a breakdown may add; which ones they
+    are, and how many, follows from the results. ``expected_s`` is for the runs to do, on ``jobs``
+    processes.
+    """
+
+    folder: Path
+    runs: int
+    done: int
+    failed: int
+    damaged: int
+    searches_at_most: int
+    jobs: int
+    expected_s: float
+
+    @property
+    def missing(self) -> int:
+        """Runs to do, damaged and failed ones too, without those of searches."""
+        return self.runs - self.done
+
+
+def outlook_of(
+    store: Store | None, folder: Path, specs: Sequence[RunSpec], at_most: int, jobs: int
+) -> Outlook:
+    """Returns the outlook of a study; ``store`` is None where nothing was begun."""
+    seen: dict[tuple[str, bool], list[float]] = defaultdict(list)
+    done = failed = damaged = 0
+    missing = []
+    for spec in specs:
+        part = store.stored(spec) if store is not None else None
+        if part is not None and part.run["status"] == "ok":
+            done += 1
+            seen[_kind(spec)].append(part.run["wall_s"] / max(1.0, _vehicles(spec)))
+            continue
+        failed += part is not None
+        damaged += store is not None and store.is_damaged(spec)
+        missing.append(spec)
+    per_vehicle_s = {**SECONDS_PER_VEHICLE, **{kind: median(s) for kind, s in seen.items()}}
+    expected_s = sum(per_vehicle_s[_kind(spec)] * _vehicles(spec) for spec in missing) / jobs
+    searches = at_most - len(specs)
+    return Outlook(folder, len(specs), done, failed, damaged, searches, jobs, expected_s)
+
+
+def _kind(spec: RunSpec) -> tuple[str, bool]:
+    return spec.engine, spec.drivers is not None
+
+
+def _vehicles(spec: RunSpec) -> float:
+    scenario = spec.scenario
+    flow_veh_h = scenario.mainline.flow_veh_h + scenario.ramp.flow_veh_h
+    return max(float(len(scenario.arrivals)), flow_veh_h * scenario.simulation.horizon_s / 3600.0)

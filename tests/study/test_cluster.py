@@ -1,0 +1,108 @@
+"""A study on a real Dask scheduler with workers on loopback, one of which is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from distributed import Client
+
+import coramp
+from coramp.studies import cluster
+from tests.study import apart_from_time, written
+
+STUDY = """
+name = "on a cluster"
+scenario = "paper"
+seeds = 8
+horizon_s = 600.0
+
+[[runs]]
+strategies = ["mainline-priority", "ramp-priority"]
+engine = "exact"
+mainline_veh_h = [1800.0, 3600.0]
+ramp_veh_h = [500.0]
+
+[[runs]]
+strategies = ["mainline-priority"]
+mainline_veh_h = [800.0]
+ramp_veh_h = [200.0]
+"""
+
+
+def started(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+@pytest.fixture
+def dask(tmp_path):
+    """A scheduler's address and the processes of its two workers."""
+    contact = tmp_path / "scheduler.json"
+    processes = [
+        started(
+            "dask_scheduler",
+            *("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-jupyter"),
+            *("--scheduler-file", str(contact)),
+        )
+    ]
+    while not contact.exists():
+        time.sleep(0.1)
+    processes += [
+        started(
+            "dask_worker",
+            *("--scheduler-file", str(contact), "--name", name, "--nthreads", "1"),
+            *("--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path / name)),
+        )
+        for name in ("one", "two")
+    ]
+    with Client(scheduler_file=str(contact)) as client:
+        client.wait_for_workers(2, timeout=60)
+        address = client.scheduler.address
+    yield address, processes[1:]
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_that_is_killed_costs_only_its_own_runs(dask, tmp_path):
+    address, workers = dask
+    definition = written(tmp_path, STUDY)
+    seen = []
+
+    def kill_one(state):
+        seen.append(state.done)
+        if state.done == 8:
+            os.kill(workers[0].pid, signal.SIGKILL)
+
+    there = coramp.study(definition, cluster=address, out=tmp_path / "there", progress=kill_one)
+    assert workers[0].wait(timeout=10) == -signal.SIGKILL
+    assert there.failed.is_empty()
+    assert max(seen) == 40
+    here = coramp.study(definition, jobs=2, out=tmp_path / "here")
+    assert apart_from_time(there.runs).equals(apart_from_time(here.runs))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_of_another_version_is_refused(dask, tmp_path, monkeypatch):
+    address, _ = dask
+    monkeypatch.setattr(cluster, "RESULT_VERSION", 99)
+    with pytest.raises(coramp.CorampError, match=r"--cluster: tcp://.* instead of 99; install"):
+        coramp.study(written(tmp_path, STUDY), cluster=address, out=tmp_path / "o")
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x", "127.0.0.1:notaport"])
+def test_an_address_that_nobody_answers_is_told(address, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWER_S", 1)
+    with pytest.raises(coramp.CorampError, match=f"--cluster: {address}: no Dask scheduler"):
+        coramp.study(written(tmp_path, STUDY), cluster=address, out=tmp_path / "o")
+    assert not (tmp_path / "o").exists()

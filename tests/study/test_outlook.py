@@ -1,0 +1,66 @@
+"""What a study would do and how far it is; very large ones; another engine."""
+
+import json
+
+import pytest
+
+import coramp
+from coramp.api import outlook
+from coramp.cli import main
+from tests.study import GRID, written
+
+
+def test_nothing_is_run_or_written_by_a_dry_run(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study", written(tmp_path), "--dry-run", "--json", "--out", str(tmp_path / "o")])
+    assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["runs"], told["done"], told["missing"]) == (6, 0, 6)
+    assert told["expected_s"] > 0.0
+    assert not (tmp_path / "o").exists()
+
+
+def test_the_status_counts_what_is_done_and_what_is_damaged(tmp_path):
+    definition, folder = written(tmp_path), tmp_path / "o"
+    whole = coramp.study(definition, jobs=1, out=folder)
+    assert outlook(definition, out=folder).done == 6
+    part = folder / "parts" / f"{whole.runs['run_id'][0]}.json"
+    part.write_bytes(part.read_bytes()[:-40])
+    seen = outlook(definition, out=folder)
+    assert (seen.done, seen.damaged, seen.missing, seen.failed) == (5, 1, 1, 0)
+
+
+def test_half_the_processes_take_twice_as_long(tmp_path):
+    definition = written(tmp_path)
+    one, two = (outlook(definition, jobs=jobs, out=tmp_path / "o") for jobs in (1, 2))
+    assert one.expected_s == pytest.approx(2 * two.expected_s)
+
+
+def test_very_many_runs_are_asked_about(tmp_path):
+    definition = written(tmp_path)
+    with pytest.raises(coramp.CorampError, match="has 300000 runs; add --yes to run so many"):
+        outlook(definition, seeds=100_000)
+    with pytest.raises(coramp.CorampError, match="--yes"):
+        coramp.study(definition, seeds=100_000, out=tmp_path / "o")
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_study_without_runs_is_told(tmp_path):
+    text = GRID[: GRID.index("[[runs]]")]
+    with pytest.raises(coramp.CorampError, match="at least one of runs and searches"):
+        coramp.study(written(tmp_path, text), out=tmp_path / "o")
+
+
+def test_another_engine_moves_only_cooperative_runs(tmp_path):
+    definition = written(tmp_path)
+    sumo = coramp.study(definition, jobs=2, out=tmp_path / "sumo").runs
+    exact = coramp.study(definition, jobs=2, engine="exact", out=tmp_path / "exact").runs
+    engines = dict(exact.select("strategy", "engine").unique().iter_rows())
+    assert engines == {"mainline-priority": "exact", "uncontrolled": "sumo"}
+    assert exact["mainline_delay_s"].to_list() == pytest.approx(
+        sumo["mainline_delay_s"].to_list(), abs=1e-9
+    )
+    with pytest.raises(coramp.CorampError, match="holds another study"):
+        coramp.study(definition, engine="exact", out=tmp_path / "sumo")
+    with pytest.raises(coramp.CorampError, match="there is no 'exactly'"):
+        coramp.study(definition, engine="exactly", out=tmp_path / "o")
