@@ -1,66 +1,24 @@
-"""A cooperative run in SUMO against plain sumo on the same network and routes, side by side.
+"""Cooperative runs, in SUMO and in the exact engine, against plain sumo on the same demand.
 
-Both as simulation time: from the start of the simulation to its end, without start-up. Planning,
-audit and commands are part of the cooperative run; plain sumo writes nothing.
+Side by side in every round, as ratios. In SUMO both are simulation time, from the start of the
+simulation to its end; planning, audit and commands are part of ours. The exact engine's time is
+that of a whole run, arrivals and all metrics included.
 """
 
-import re
 import statistics
-import subprocess
 import time
-from contextlib import contextmanager
-from dataclasses import dataclass
 
 import pytest
 
-from coramp.engines.sumo import engine
+from benchmarks.simulation import plain_sumo_s, simulation_clock
 from coramp.engines.sumo.engine import SumoOptions, run_cooperative
-from coramp.engines.sumo.network import sumo_binary
-from coramp.engines.sumo.session import Session
 from coramp.loading import load_scenario
+from coramp.running import execute, make_spec
 from coramp.strategies.registry import strategy_named
 
 ROUNDS = 9
-TARGET = 1.3
-
-
-@dataclass
-class Clock:
-    seconds: float = 0.0
-
-
-@contextmanager
-def simulation_clock(monkeypatch):
-    """Times what happens between the start and the close of SUMO sessions."""
-    clock = Clock()
-
-    class Timed(Session):
-        def __enter__(self):
-            self.started = time.perf_counter()
-            return super().__enter__()
-
-        def __exit__(self, *reason):
-            clock.seconds = time.perf_counter() - self.started
-            return super().__exit__(*reason)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(engine, "Session", Timed)
-        yield clock
-
-
-def plain_sumo_s(folder):
-    """Returns the simulation time that sumo itself reports."""
-    command = (folder / "command.txt").read_text().split()[1:]
-    done = subprocess.run(
-        [sumo_binary("sumo"), *command, "--duration-log.statistics", "--no-warnings"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    found = re.search(r"Duration: ([0-9.]+)s", done.stdout)
-    assert found is not None, done.stdout
-    return float(found.group(1))
+SUMO_AT_MOST = 1.15
+EXACT_AT_LEAST = 20.0
 
 
 @pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
@@ -68,20 +26,44 @@ def test_cooperative_run_against_plain_sumo(benchmark, monkeypatch, tmp_path, st
     scenario = load_scenario("paper", {"mainline.flow_veh_h": 1800.0, "ramp.flow_veh_h": 500.0})
     chosen = strategy_named(strategy)()
     run_cooperative(scenario, chosen, 1, SumoOptions(keep_in=tmp_path / "kept"))
-    ratios, plain, ours = [], [], []
+    plain, ours = [], []
 
     def one_round():
         with simulation_clock(monkeypatch) as clock:
             run_cooperative(scenario, chosen, 1, SumoOptions())
         ours.append(clock.seconds)
         plain.append(plain_sumo_s(tmp_path / "kept"))
-        ratios.append(ours[-1] / plain[-1])
 
     benchmark.pedantic(one_round, rounds=ROUNDS, iterations=1)
-    ratio = statistics.median(ratios)
-    benchmark.extra_info["ratio to plain sumo"] = round(ratio, 2)
+    ratio = statistics.median(o / p for o, p in zip(ours, plain, strict=True))
     print(
-        f"\n{strategy}, 1800 + 500 veh/h, 1800 s: cooperative {statistics.median(ours):.2f} s, "
-        f"plain sumo {statistics.median(plain):.2f} s, ratio {ratio:.2f} (at most {TARGET})"
+        f"\n{strategy}, 1800 + 500 veh/h, 1800 s: in SUMO {statistics.median(ours):.3f} s, "
+        f"plain sumo {statistics.median(plain):.3f} s, ratio {ratio:.2f} (at most {SUMO_AT_MOST})"
     )
-    assert ratio <= TARGET
+    assert ratio <= SUMO_AT_MOST
+
+
+def test_exact_run_against_plain_sumo(benchmark, tmp_path):
+    spec = make_spec("paper", engine="exact", mainline_veh_h=1800, ramp_veh_h=500)
+    strategy = strategy_named(spec.strategy)()
+    run_cooperative(spec.scenario, strategy, 1, SumoOptions(keep_in=tmp_path / "kept"))
+    execute(spec)
+    exact, plain = [], []
+
+    def one_round():
+        plain.append(plain_sumo_s(tmp_path / "kept"))
+        times = []
+        for _ in range(10):
+            started = time.perf_counter()
+            execute(spec)
+            times.append(time.perf_counter() - started)
+        exact.append(statistics.median(times))
+
+    benchmark.pedantic(one_round, rounds=ROUNDS, iterations=1)
+    ratio = statistics.median(p / e for e, p in zip(exact, plain, strict=True))
+    print(
+        f"\nexact engine, 1800 + 500 veh/h, 1800 s: {statistics.median(exact) * 1e3:.1f} ms, plain "
+        f"sumo {statistics.median(plain):.3f} s, {ratio:.1f} times as fast "
+        f"(at least {EXACT_AT_LEAST:g})"
+    )
+    assert ratio >= EXACT_AT_LEAST

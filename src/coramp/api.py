@@ -257,7 +257,10 @@ def _defined(name: str, seeds: int | None, engine: str | None, many: bool) -> tu
     if engine is not None:
         definition = definition.on_engine(engine_checked(engine))
     seeds = definition.seeds if seeds is None else seeds
-    runs = count_runs(definition, max(1, seeds))
+    try:
+        runs = count_runs(definition, max(1, seeds))
+    except CorampError as error:
+        raise CorampError(*(f"{name}: {line}" for line in error.messages)) from None
     if runs > MANY_RUNS and not many:
         raise CorampError(
             f"{name}: has {runs} runs; add --yes to run so many, or lower --seeds or the flows"

@@ -31,7 +31,7 @@ from coramp.coordination.gate import (
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.plant import Arrival, Plant
 from coramp.core.fleet import proposed
-from coramp.core.rules import Rules
+from coramp.core.rules import Rules, packed
 from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import (
     Decision,
@@ -79,6 +79,7 @@ class Coordinator:
         self.refusals: list[Refusal] = []
         self._strategy = strategy
         self._rules = rules
+        self._packed = packed(rules)
         self._examiner = Examiner(bounds_of(rules))
         self._arrivals = arrivals
         self._gate = gate_for(arrivals)
@@ -112,7 +113,7 @@ class Coordinator:
         while True:
             self.ledger.make_room()
             stop = admit_until(
-                self.ledger.book, self._gate, last_step, self._rules, self._examiner.bounds
+                self.ledger.book, self._gate, last_step, self._packed, self._examiner.bounds
             )
             last_step = min(last_step, self._announce_entries())
             if stop.why == REFUSED:
@@ -243,6 +244,7 @@ class Coordinator:
             partial(self.ledger.reports, time_s),
             self._fastest_entry_mps,
             self._rules,
+            self._packed,
         )
         decision = self._strategy.decide(view, self._memory)
         trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]

@@ -16,7 +16,7 @@ from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_full, strike_exited
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
-from coramp.core.rules import Rules
+from coramp.core.rules import Rules, unpacked
 
 NEVER = 1 << 60
 WAITS = -1
@@ -93,12 +93,15 @@ def _next_tries(gate: Gate, stream: int, step: int) -> None:
 
 
 @kernel
-def admit_until(book: Book, gate: Gate, last_step: int, rules: Rules, bounds: Bounds) -> Stop:
+def admit_until(
+    book: Book, gate: Gate, last_step: int, packed_rules: FloatArray, bounds: Bounds
+) -> Stop:
     """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
 
     Whoever cannot enter safely tries again at the next step, and holds up those behind. Whoever has
     left the zone by then is off the live list.
     """
+    rules = unpacked(packed_rules)
     while True:
         step = min(gate.try_step[0], gate.try_step[1])
         strike_exited(book, min(step, last_step) * rules.control.step_s)

@@ -2,6 +2,10 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
+from coramp._kernel import FloatArray, kernel
+
 
 class Road(NamedTuple):
     """One mainline lane, one ramp and the acceleration lane between them.
@@ -83,3 +87,20 @@ class Rules(NamedTuple):
     safety: SafetyBudget
     motion: MotionLimits
     control: Control
+
+
+def packed(rules: Rules) -> FloatArray:
+    """Returns the rules as one array: numba takes that in a thirtieth of the time."""
+    return np.array([float(value) for part in rules for value in part])
+
+
+@kernel
+def unpacked(numbers: FloatArray) -> Rules:
+    """Returns the rules that ``packed`` made an array of."""
+    n = numbers
+    return Rules(
+        Road(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10]),
+        SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16]),
+        MotionLimits(n[17], n[18], n[19], n[20], n[21], n[22], n[23], n[24]),
+        Control(n[25], n[26], n[27], n[28] != 0.0, n[29] != 0.0),
+    )

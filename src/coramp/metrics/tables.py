@@ -111,9 +111,7 @@ def _stream_names(on_ramp: BoolArray) -> list[str]:
 
 
 def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
-    frame = pl.DataFrame(
-        {name: columns[name] for name in schema}, schema=schema, nan_to_null=True, strict=False
-    )
+    frame = pl.DataFrame({name: columns[name] for name in schema}, schema=schema)
     return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
@@ -125,19 +123,14 @@ def speeds_table(outcome: Outcome) -> pl.DataFrame:
     distance_m, time_s, vehicles = binned_motion(
         pieces.first, pieces.rows, until_s, passages.on_ramp, bins
     )
-    frames = []
-    for stream, name in enumerate(STREAMS):
-        used = np.flatnonzero(time_s[stream] > 0.0)
-        frames.append(
-            _frame(
-                SPEEDS,
-                stream=[name] * len(used),
-                time_s=used * BIN_S,
-                mean_speed_mps=distance_m[stream, used] / time_s[stream, used],
-                vehicles=vehicles[stream, used],
-            )
-        )
-    return pl.concat(frames)
+    stream, used = np.nonzero(time_s > 0.0)
+    return _frame(
+        SPEEDS,
+        stream=[STREAMS[k] for k in stream.tolist()],
+        time_s=used * BIN_S,
+        mean_speed_mps=distance_m[stream, used] / time_s[stream, used],
+        vehicles=vehicles[stream, used],
+    )
 
 
 def trajectories_table(outcome: Outcome) -> pl.DataFrame:

@@ -35,7 +35,8 @@ class View:
     their decision stations. ``acknowledged`` holds the commitments that vehicles have confirmed;
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
     which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
-    ``reports``. A strategy must not write into any of the arrays.
+    ``reports``. ``packed_rules`` are the rules as kernels take them (``core.rules``). A strategy
+    must not write into any of the arrays.
     """
 
     time_s: float
@@ -45,6 +46,7 @@ class View:
     ask_reports: Callable[[], Reports]
     fastest_entry_mps: float
     rules: Rules
+    packed_rules: FloatArray
 
     @cached_property
     def reports(self) -> Reports:

@@ -20,7 +20,7 @@ from coramp.strategies.situation import (
     ramp_neighbours,
 )
 
-Planner = Callable[[Fleet, int, float, float, Rules], tuple[MergePlan, Proposal]]
+Planner = Callable[[Fleet, int, float, float, FloatArray], tuple[MergePlan, Proposal]]
 
 
 @kernel
@@ -128,7 +128,9 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     waiting = memory if isinstance(memory, frozenset) else frozenset()
     rest = tuple((view.time_s, other) for other in view.subjects[1:])
     from_s = view.time_s + view.rules.control.actuation_delay_s
-    plan, proposal = planner(view.fleet, row, view.time_s, view.fastest_entry_mps, view.rules)
+    plan, proposal = planner(
+        view.fleet, row, view.time_s, view.fastest_entry_mps, view.packed_rules
+    )
     blocked, behind = ramp_neighbours(view.fleet, row, from_s)
     if blocked or plan.rung == RUNG_HOLD:
         again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)

@@ -7,9 +7,9 @@ mainline by X moving ahead, Y falling back, or both; a later gap; a stop before 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from coramp._kernel import kernel
+from coramp._kernel import FloatArray, kernel
 from coramp.core.fleet import Fleet, Proposal, empty_proposal
-from coramp.core.rules import Rules
+from coramp.core.rules import unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.rungs import create, delay, merge_freely, no_merge, reach
@@ -32,9 +32,10 @@ def plan_with_mainline_priority(
     subject: int,
     now_s: float,
     fastest_entry_mps: float,
-    rules: Rules,
+    packed_rules: FloatArray,
 ) -> tuple[MergePlan, Proposal]:
     """Returns the plan of the first rung that helps, and the trajectories that it proposes."""
+    rules = unpacked(packed_rules)
     proposal = empty_proposal()
     situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
     merge = merge_freely(fleet, proposal, situation, rules)

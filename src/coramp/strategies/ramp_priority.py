@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from coramp._kernel import kernel
+from coramp._kernel import FloatArray, kernel
 from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal, proposed
-from coramp.core.rules import Rules
+from coramp.core.rules import Rules, unpacked
 from coramp.core.trajectory import cruise_intercept_m
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.ladder import decide_first, plan_of
@@ -52,20 +52,34 @@ def open_gap(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rule
     The one that adjusts fewest vehicles, then the one with the smallest sum of shifts.
     """
     here = gap_of_free_movement(situation)
-    best = no_merge()
+    best, latest = no_merge(), -1
     if situation.free_m < unknown_bound_m(fleet, situation):
         return best
     fewest, least_m = 0, math.inf
-    for gap in range(max(0, here - 1), min(len(situation.order), here + 1) + 1):
+    for gap in (here, here - 1, here + 1):
+        if gap < 0 or gap > len(situation.order):
+            continue
+        movers, shift_m = least_moved(fleet, situation, gap)
+        if best.gap >= 0 and (movers, shift_m) >= (fewest, least_m):
+            continue
+        latest = gap
         merge = merge_at(fleet, proposal, situation, gap, situation.free_m, True, rules)
         if merge.gap < 0:
             continue
         moved, moved_m = proposal.size[0] - 1, total_shift_m(fleet, proposal, rules)
-        if best.gap < 0 or moved < fewest or (moved == fewest and moved_m < least_m):
+        if best.gap < 0 or (moved, moved_m) < (fewest, least_m):
             best, fewest, least_m = merge, moved, moved_m
-    if best.gap >= 0:
+    if best.gap >= 0 and best.gap != latest:
         return merge_at(fleet, proposal, situation, best.gap, situation.free_m, True, rules)
     return best
+
+
+@kernel
+def least_moved(fleet: Fleet, situation: Situation, gap: int) -> tuple[int, float]:
+    """Returns how many must move at least for free movement to fit into a gap, and how far (m)."""
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    ahead_m, back_m = max(0.0, situation.free_m - high_m), max(0.0, low_m - situation.free_m)
+    return int(ahead_m > 0.0) + int(back_m > 0.0), ahead_m + back_m
 
 
 @kernel
@@ -86,9 +100,10 @@ def plan_with_ramp_priority(
     subject: int,
     now_s: float,
     fastest_entry_mps: float,
-    rules: Rules,
+    packed_rules: FloatArray,
 ) -> tuple[MergePlan, Proposal]:
     """Returns the plan of the first rung that helps, and the trajectories that it proposes."""
+    rules = unpacked(packed_rules)
     proposal = empty_proposal()
     situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
     merge = merge_freely(fleet, proposal, situation, rules)
