@@ -55,21 +55,26 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
             *_stream_arrivals(scenario, False, scenario.mainline, seed),
             *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
-    given.sort(key=lambda arrival: (arrival.step, arrival.on_ramp))
     numbers = (count(1), count(1))
-    return [a._replace(vehicle_id=_name(a.on_ramp, next(numbers[a.on_ramp]))) for a in given]
+    return [
+        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, speed_mps, length_m)
+        for step, on_ramp, speed_mps, length_m in sorted(given)
+    ]
 
 
 def _name(on_ramp: bool, number: int) -> str:
     return f"{'r' if on_ramp else 'm'}{number:05d}"
 
 
-def _explicit_arrivals(scenario: Scenario) -> list[Arrival]:
+Unnamed = tuple[int, bool, float, float]
+"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m)."""
+
+
+def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
     return [
-        Arrival(
-            "",
-            arrival.stream == "ramp",
+        (
             round(arrival.time_s / scenario.control.step_s),
+            arrival.stream == "ramp",
             arrival.speed_mps,
             arrival.length_m or scenario.vehicle.length_m,
         )
@@ -79,7 +84,7 @@ def _explicit_arrivals(scenario: Scenario) -> list[Arrival]:
 
 def _stream_arrivals(
     scenario: Scenario, on_ramp: bool, stream: Mainline | Ramp, seed: int
-) -> list[Arrival]:
+) -> list[Unnamed]:
     name, step_s = STREAMS[on_ramp], scenario.control.step_s
     times_s = arrival_times_s(
         stream.flow_veh_h,
@@ -93,6 +98,6 @@ def _stream_arrivals(
     steps = np.rint(times_s / step_s).astype(np.int64)
     length_m = scenario.vehicle.length_m
     return [
-        Arrival("", on_ramp, step, speed_mps, length_m)
+        (step, on_ramp, speed_mps, length_m)
         for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
     ]

@@ -102,7 +102,10 @@ def run(
     mainline: Annotated[float | None, typer.Option(help="Mainline flow in veh/h.")] = None,
     ramp: Annotated[float | None, typer.Option(help="Ramp flow in veh/h.")] = None,
     drivers: Annotated[
-        str | None, typer.Option(help="Who drives uncontrolled vehicles: paper or fair.")
+        str | None,
+        typer.Option(
+            help="Who drives uncontrolled vehicles: paper, fair or another of the scenario."
+        ),
     ] = None,
     settings: Annotated[
         list[str] | None,

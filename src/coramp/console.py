@@ -202,24 +202,29 @@ def print_story(story: Story) -> None:
             f", after waiting {number(vehicle['waiting_s'], 1)} s" if vehicle["waiting_s"] else ""
         )
         print(f"  {number(vehicle['entry_s'], 1)} s: enters{waited}")
-    for chapter in story.chapters:
-        print(f"  {number(chapter.decision['time_s'], 1)} s: {told(chapter.decision)}")
-    for row in story.moved_for:
-        shift = number(row["largest_shift_m"])
-        print(
-            f"  {number(row['time_s'], 1)} s: moves aside, or brakes, for {row['vehicle_id']} "
-            f"(largest shift then {shift} m)"
-        )
+    events = [(c.decision["time_s"], told(c.decision)) for c in story.chapters]
+    events += [(row["time_s"], _moved(row)) for row in story.moved_for]
+    for time_s, text in sorted(events):
+        print(f"  {number(time_s, 1)} s: {text}")
     if vehicle["exit_s"] is not None:
         print(
             f"  {number(vehicle['exit_s'], 2)} s: leaves; delay {number(vehicle['delay_s'], 3)} s "
             f"of {number(vehicle['free_flow_s'], 1)} s, {number(vehicle['fuel_l'], 4)} l of fuel"
         )
+    else:
+        print("  not out when the run was cut off")
     print()
     for chapter in story.chapters:
         when, rung = number(chapter.decision["time_s"], 1), chapter.decision["rung"]
         title = f"{name}, decision at {when} s, rung {rung}"
         print_table(quantity_table(title, chapter.quantities))
+
+
+def _moved(row: Row) -> str:
+    shift_m = row["largest_shift_m"]
+    if shift_m:
+        return f"moves aside for {row['vehicle_id']} (largest shift then {number(shift_m)} m)"
+    return f"brakes behind {row['vehicle_id']}"
 
 
 def story_json(story: Story) -> Row:

@@ -185,7 +185,7 @@ def _distances(case: _Case) -> list[Quantity]:
         Quantity(
             "",
             "",
-            "the same with the execution allowance for each pair",
+            "least gap planned: the larger of Eq. 1 and 15 and the allowance, twice",
             case.length_m + 2.0 * merge_clearance_m(case.rules.road, safety),
             "m",
         ),

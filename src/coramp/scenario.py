@@ -17,6 +17,10 @@ from coramp.core.safe_distance import braking_distance_m, merge_clearance_m
 
 FASTEST_MPS = 60.0
 NEAREST_STOP_M = -1.0
+LONGEST_STEP_S = 0.25
+"""Up to here SUMO was seen to stay within 5 cm of the plan; the error grows with the square."""
+SHORTEST_EDGE_M = 1.0
+"""What SUMO can still build behind the acceleration lane."""
 GRIP_SHARE = 0.95
 """Of the braking that Eq. 3 allows, what stops before the nose use."""
 
@@ -98,7 +102,7 @@ class Motion(Model):
 class Controller(Model):
     """The control clock and the readings of the paper that are open to choice."""
 
-    step_s: Annotated[float, Field(ge=0.01, le=1.0)] = 0.1
+    step_s: Annotated[float, Field(ge=0.01, le=LONGEST_STEP_S)] = 0.1
     actuation_delay_s: Annotated[float, Field(ge=0.0, le=5.0)] = 0.1
     retry_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.5
     gap_position: Literal["nearest", "front"] = "nearest"
@@ -266,10 +270,10 @@ def _speed_problems(scenario: Scenario) -> list[str]:
 def _place_problems(scenario: Scenario) -> list[str]:
     mainline, ramp = scenario.mainline, scenario.ramp
     problems = []
-    if mainline.end_m <= ramp.acceleration_lane_m:
+    if mainline.end_m < ramp.acceleration_lane_m + SHORTEST_EDGE_M:
         problems.append(
-            f"mainline.end_m: {mainline.end_m:g} is not beyond the acceleration lane; "
-            f"allowed is above {ramp.acceleration_lane_m:g} m"
+            f"mainline.end_m: {mainline.end_m:g} is not far enough beyond the acceleration lane; "
+            f"allowed is at least {ramp.acceleration_lane_m + SHORTEST_EDGE_M:g} m"
         )
     if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
         problems.append(
@@ -363,7 +367,13 @@ def _planning_problems(scenario: Scenario) -> list[str]:
             f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
         )
     first, last = decision_station_range_m(scenario)
-    if not first <= ramp.decision_station_m <= last:
+    if first > last:
+        problems.append(
+            "ramp.decision_station_m: there is none at which all that matter have entered "
+            f"({first:.1f} m or later) and it can still stop ({last:.1f} m or earlier); "
+            "allowed are an earlier mainline.start_m, a shorter acceleration lane, harder braking"
+        )
+    elif not first <= ramp.decision_station_m <= last:
         problems.append(
             f"ramp.decision_station_m: at {ramp.decision_station_m:g} m not every vehicle that "
             "matters has entered, or it is too late to stop; "

@@ -87,6 +87,10 @@ def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
         key, sign, value = text.partition("=")
         if not sign or not key.strip():
             raise CorampError(f"--set: {text}: is not KEY=VALUE; an example is control.step_s=0.05")
+        if key.strip() in overrides:
+            raise CorampError(f"--set: {key.strip()}: given twice; allowed is once")
+        if "\n" in text:
+            raise CorampError(f"--set: {text}: has a line break; allowed is one KEY=VALUE")
         try:
             overrides[key.strip()] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:

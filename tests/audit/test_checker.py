@@ -666,3 +666,39 @@ def test_least_margin_is_that_of_the_nearest_pair():
 def test_vehicle_alone_on_the_road_has_all_the_room_there_is():
     found = verdict(New(0, pieces(1.0, -169.0, 20.0), STREAM), vehicles=ROAD[:1])
     assert (found.code, found.least_margin_m) == (ACCEPTED, math.inf)
+
+
+def _busy_traffic(rng):
+    """Eight vehicles over 700 m: on the mainline, merging sooner or later, or not at all."""
+    road = []
+    for _ in range(8):
+        speeds_mps, durations_s = rng.uniform(16.0, 22.0, 2), rng.uniform(1.0, 4.0, 2)
+        stretches = [(speeds_mps[1], durations_s[0]), (20.0, durations_s[1])]
+        way = pieces(0.0, rng.uniform(-500.0, 200.0), speeds_mps[0], stretches)
+        merge_s = rng.choice([STREAM, STREAM, STREAM, 0.5, rng.uniform(1.5, 12.0), UNDECIDED])
+        road.append((way, merge_s, rng.uniform(4.0, 16.0)))
+    return road
+
+
+def test_pairs_that_are_skipped_for_being_far_apart_change_no_verdict():
+    # with a single other vehicle on the road nothing is skipped
+    rng = np.random.default_rng(8)
+    accepted = 0
+    for k in range(400):
+        road = _busy_traffic(rng)
+        if k % 2 == 0:
+            slow_mps = rng.uniform(17.0, 20.0)
+            way = pieces(1.0, rng.uniform(-400.0, 100.0), 20.0, [(slow_mps, 2.0), (20.0, 2.0)])
+            new, road[0] = New(0, way, STREAM), (way, STREAM, 5.0)
+        else:
+            new, road[0] = New(0, MERGE, 12.0), (R_WAY, UNDECIDED, 5.0)
+        singly = [verdict(new, vehicles=road, live=[other]) for other in range(1, 8)]
+        found = verdict(new, vehicles=road)
+        unsafe = {one.other_row: one for one in singly if one.code != ACCEPTED}
+        if unsafe:
+            assert found == unsafe[found.other_row]
+        else:
+            assert found.code == ACCEPTED
+            assert found.least_margin_m == min(one.least_margin_m for one in singly)
+            accepted += 1
+    assert 50 < accepted < 350

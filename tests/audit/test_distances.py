@@ -9,10 +9,13 @@ from hypothesis import strategies as st
 
 from coramp.audit.distances import (
     Bounds,
+    Envelope,
+    envelope_of,
     following_distance_m,
     lane_change_distance_m,
     least_between_m,
     least_margin_m,
+    margin_at_least_m,
     margin_at_m,
     next_knot_s,
     passes_s,
@@ -248,3 +251,78 @@ def test_least_margin_for_ever_agrees_with_the_planners(front, rear, budget):
     planned_m, _ = smallest_margin_m(front, 4.5, rear, start_s, math.inf, safety)
     assert least_m == pytest.approx(planned_m, abs=1e-7)
     assert math.isfinite(least_m)
+
+
+# envelopes ----------------------------------------------------------------------------------
+
+
+def test_envelope_by_hand():
+    # station - 20 t: -70 at 1 s, -100 at 4 s, -125 at 9 s, then -225 at 19 s and ever less
+    assert envelope_of(WAY, 1.0, 20.0) == (-math.inf, close(-70.0), 0.0, 20.0)
+    ends_at_14 = pieces(1.0, -50.0, 10.0, [(10.0, 3.0), (20.0, 5.0), (14.0, 3.0)])
+    # station - 14 t: -64 at 1 s, -76 at 4 s, -80 at 6 s (14 m/s), -71 at 9 s, -62 at 12 s
+    assert envelope_of(ends_at_14, 1.0, 14.0) == (close(-80.0), close(-62.0), 10.0, 20.0)
+    assert envelope_of(ends_at_14, 9.0, 14.0) == (close(-71.0), close(-62.0), 14.0, 20.0)
+
+
+def test_envelope_is_open_where_the_end_leaves_it():
+    assert envelope_of(pieces(0.0, 0.0, 21.0), 2.0, 20.0) == (close(2.0), math.inf, 21.0, math.inf)
+    assert envelope_of(pieces(0.0, 0.0, 19.0), 2.0, 20.0) == (-math.inf, close(-2.0), 19.0, 19.0)
+    assert envelope_of(pieces(0.0, 0.0, 20.0), 2.0, 20.0) == (0.0, 0.0, 20.0, 20.0)
+    speeding_up, slowing_down = (np.array([[0.0, 0.0, 20.0, rate]]) for rate in (0.1, -0.1))
+    assert envelope_of(speeding_up, 0.0, 20.0)[1:] == (math.inf, 20.0, math.inf)
+    assert envelope_of(slowing_down, 0.0, 20.0)[0] == -math.inf
+
+
+def test_envelope_of_busy_ways_bounds_what_is_driven_and_is_tight():
+    for one, other, from_s, _ in random_pairs(6, 100):
+        for way in (one, other):
+            v0_mps = way[-1, 2]
+            envelope = envelope_of(way, from_s, v0_mps)
+            last_s = max(from_s, way[-1, 0]) + 1.0
+            knots_s = way[way[:, 0] >= from_s, 0]
+            times_s = np.concatenate([np.linspace(from_s, last_s, 20001), knots_s])
+            stations_m, speeds_mps = sampled(way, times_s)
+            intercepts_m = stations_m - v0_mps * times_s
+            slack_m = np.abs(way[:, 3]).max() * ((last_s - from_s) / 20000.0) ** 2 / 8.0 + 1e-9
+            assert -1e-9 <= intercepts_m.min() - envelope.lowest_m <= slack_m
+            assert -1e-9 <= envelope.highest_m - intercepts_m.max() <= slack_m
+            assert (envelope.slowest_mps, envelope.fastest_mps) == (
+                close(speeds_mps.min()),
+                close(speeds_mps.max()),
+            )
+
+
+def test_margin_at_least_by_hand():
+    front, rear = Envelope(100.0, 110.0, 18.0, 21.0), Envelope(60.0, 70.0, 19.0, 22.0)
+    # the lane change at 18 m/s beside 22 m/s: (3.6 (22 - 18 cos 30))^2 / 129.54 and 0.04
+    needed_m = 0.04 + (3.6 * (22.0 - 15.588457268119896)) ** 2 / 129.54
+    assert margin_at_least_m(front, 5.0, rear, BOUNDS) == close(25.0 - needed_m)
+    # with a time gap Eq. 1: 0.6 + 0.05 (18 + 22 + 3) + 14.4^2 / 129.54 + 0.4 * 22
+    following_m = 0.6 + 2.15 + 207.36 / 129.54 + 8.8
+    assert margin_at_least_m(front, 5.0, rear, WIDE_BOUNDS) == close(25.0 - following_m)
+    # slow in front and fast behind, or the other way round, asks the same of a lane change
+    front, rear = Envelope(100.0, 110.0, 19.0, 22.0), Envelope(60.0, 70.0, 18.0, 21.0)
+    assert margin_at_least_m(front, 5.0, rear, BOUNDS) == close(25.0 - needed_m)
+
+
+@pytest.mark.parametrize("bounds", [BOUNDS, WIDE_BOUNDS], ids=["paper", "wide"])
+def test_no_margin_falls_below_that_of_the_envelopes(bounds):
+    for front, rear, from_s, lasts_s in random_pairs(7, 100):
+        front[:, 1] += 200.0
+        times_s = np.linspace(from_s, from_s + lasts_s, 501)
+        envelopes = []
+        for way in (front, rear):  # envelopes of what is driven in the span
+            stations_m, speeds_mps = sampled(way, times_s)
+            moving_m = stations_m - 20.0 * times_s
+            envelopes.append(
+                Envelope(moving_m.min(), moving_m.max(), speeds_mps.min(), speeds_mps.max())
+            )
+        at_least_m = margin_at_least_m(envelopes[0], 4.5, envelopes[1], bounds)
+        for time_s in times_s[::50]:
+            assert at_least_m <= margin_at_m(front, 4.5, rear, time_s, bounds) + 1e-9
+            front_m, front_mps, _ = state_at(front, time_s)
+            rear_m, rear_mps, _ = state_at(rear, time_s)
+            for merging_mps, other_mps in ((front_mps, rear_mps), (rear_mps, front_mps)):
+                asked_m = lane_change_distance_m(merging_mps, other_mps, bounds)
+                assert at_least_m <= front_m - 4.5 - rear_m - asked_m + 1e-9

@@ -107,7 +107,10 @@ def refused(here, *arguments, code=1):
         ("mainline.entry_speed_mps=[20, 15]", "mainline.entry_speed_mps: [20, 15] falls; "),
         ("mainline.entry_speed_mps=15", "mainline.entry_speed_mps: 15 has the wrong shape; "),
         ("mainline.entry_speed_mps=[15]", "mainline.entry_speed_mps.1: is missing; "),
-        ("mainline.end_m=100", "mainline.end_m: 100 is not beyond the acceleration lane; "),
+        (
+            "mainline.end_m=100",
+            "mainline.end_m: 100 is not far enough beyond the acceleration lane; ",
+        ),
         ("mainline.start_m=400", "mainline.start_m: 400 is too large; allowed is below 0"),
         ("control.actuation_delay_s=0.15", "control.actuation_delay_s: 0.15 is not on the control"),
         (
@@ -450,13 +453,24 @@ class TestFolders:
         (line,) = refused(taken, "study", "s.toml", "--jobs", "1", "--out", "r")
         assert line.startswith("Error: r: holds other files and no study; give another")
 
-    @pytest.mark.parametrize("content", ["[]", '{"kind": "run"}', "{", "\x00"])
+    @pytest.mark.parametrize("content", ["[]", '{"kind": "run"}'])
     def test_a_damaged_mark_of_a_study_is_told(self, taken, content):
         Path("o").mkdir()
         Path("o/study.json").write_text(content)
         (line,) = refused(taken, "study", "s.toml", "--jobs", "1", "--out", "o")
         assert line.startswith("Error: o/study.json: ")
         assert Path("o/study.json").read_text() == content
+
+    @pytest.mark.parametrize("content", ["", "{", "\x00", None])
+    def test_an_unreadable_or_lost_mark_is_written_again_and_no_run_is_lost(self, taken, content):
+        arguments = ("study", "s.toml", "--jobs", "1", "--out", "o")
+        assert invoke(*arguments).code == 0
+        mark, before = Path("o/study.json"), Path("o/study.json").read_text()
+        parts = {p: p.stat().st_mtime_ns for p in Path("o/parts").iterdir()}
+        mark.unlink() if content is None else mark.write_text(content)
+        assert invoke(*arguments).code == 0
+        assert mark.read_text() == before
+        assert {p: p.stat().st_mtime_ns for p in Path("o/parts").iterdir()} == parts
 
     def test_results_of_another_version_are_not_mixed(self, taken, monkeypatch):
         assert invoke("study", "s.toml", "--jobs", "1", "--out", "o").code == 0

@@ -192,3 +192,25 @@ def test_a_window_without_a_screen_is_a_clear_error(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     with pytest.raises(coramp.CorampError, match="no screen"):
         coramp.run("paper", horizon_s=30.0, gui=True)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"ramp.merge_angle_deg": 80.0},
+        {"control.step_s": 0.25, "control.actuation_delay_s": 0.25, "ramp.merge_angle_deg": 60.0},
+    ],
+    ids=["steep angle", "long step"],
+)
+def test_promises_hold_at_the_edges_of_what_is_allowed(overrides):
+    run = coramp.run(
+        "paper",
+        "ramp-priority",
+        mainline_veh_h=2500,
+        ramp_veh_h=1200,
+        seed=25,
+        horizon_s=150.0,
+        overrides={"mainline.min_headway_s": 0.75, "ramp.min_headway_s": 0.75, **overrides},
+    )
+    assert run.broken_promises == []
+    assert run.summary["plan_error_m"] <= 0.05

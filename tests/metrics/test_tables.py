@@ -190,7 +190,7 @@ def test_trajectories_name_vehicle_and_lane_of_each_piece():
 
 
 def explained(row, rung, scenario=0, front=-1, rear=-1, conflict=-1, **numbers):
-    fields = dict.fromkeys(Explanation.__dataclass_fields__, math.nan)
+    fields = dict.fromkeys(Explanation._fields, math.nan)
     places = {"conflict_row": conflict, "front_row": front, "rear_row": rear}
     return Explanation(
         **{**fields, "row": row, "rung": rung, "scenario": scenario, **places} | numbers

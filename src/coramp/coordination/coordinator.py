@@ -123,18 +123,22 @@ class Coordinator:
 
     def _announce_entries(self) -> int:
         """Tells the plant who has entered; returns the first step at which one is planned."""
-        gate, first_due = self._gate, NEVER
-        for row in range(self._announced, len(self.ledger)):
-            step = int(gate.row_step[row])
+        new = slice(self._announced, len(self.ledger))
+        gate, book, first_due = self._gate, self.ledger.book, NEVER
+        columns = (
+            *(gate.row_arrival[new], gate.row_step[new], gate.row_due_step[new]),
+            *(book.first_piece[new], book.piece_count[new], book.merge_time_s[new]),
+        )
+        entries = zip(*(column.tolist() for column in columns), strict=True)
+        for row, (arrival, step, due, first, count, merge_s) in enumerate(entries, new.start):
             self._plant.advance(step)
-            self._plant.enter(row, self._arrivals[gate.row_arrival[row]], step)
-            self._plant.follow(row, self.ledger.trajectory(row), self.ledger.merge_time_s(row))
-            due = int(gate.row_due_step[row])
+            self._plant.enter(row, self._arrivals[arrival], step)
+            self._plant.follow(row, book.pieces[first : first + count], merge_s)
             if due != NEVER:
                 self._due_step[row] = due
                 self._wake(due, row)
                 first_due = min(first_due, due)
-        self._announced = len(self.ledger)
+        self._announced = new.stop
         return first_due
 
     def entered(self) -> tuple[IntArray, IntArray]:

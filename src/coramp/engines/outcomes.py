@@ -41,14 +41,16 @@ def cooperative_outcome(
 ) -> Outcome:
     """Returns the outcome of a cooperative run.
 
-    ``plan_error_m`` has one entry a row. ``driven`` is what a simulator made of the plans; without
-    it they are driven as they are.
+    ``plan_error_m`` has one entry a row. ``driven`` is what a simulator made of the plans, in which
+    a lane change waits for the next step; without it they are driven as they are.
     """
     ledger, end_s = coordinator.ledger, end_step * step_s
     vehicle_of_row, entry_step = coordinator.entered()
     entry_s, merge_s, exit_s, error_m = (np.full(len(arrivals), np.nan) for _ in range(4))
     entry_s[vehicle_of_row] = entry_step * step_s
     merge_s[vehicle_of_row] = ledger.book.merge_time_s[: len(ledger)]
+    if driven is not None:
+        merge_s = np.ceil(merge_s / step_s - 1e-6) * step_s
     exit_s[vehicle_of_row] = ledger.book.exit_s[: len(ledger)]
     error_m[vehicle_of_row] = plan_error_m
     merge_s[merge_s > end_s] = np.nan

@@ -7,7 +7,7 @@ asked to be woken. It answers from the view and its own memory alone: ``decide``
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from coramp._kernel import FloatArray
 from coramp.core.fleet import Fleet
@@ -77,8 +77,7 @@ class ReleaseToDriver:
 Command = FollowTrajectory | ReleaseToDriver
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
+class Explanation(NamedTuple):
     """Why a vehicle got its plan; rows are -1 and numbers nan where there is none.
 
     Severities are in m2/s4. The last three are stations at the decision of vehicles that cruise at

@@ -17,10 +17,9 @@ from coramp.strategies.situation import (
     MergePlan,
     Situation,
     gap_size_m,
-    ramp_neighbours,
 )
 
-Planner = Callable[[Fleet, int, float, float, FloatArray], tuple[MergePlan, Proposal]]
+Planner = Callable[[Fleet, int, float, float, FloatArray], tuple[MergePlan, Proposal, bool, int]]
 
 
 @kernel
@@ -127,11 +126,9 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     row = view.subjects[0]
     waiting = memory if isinstance(memory, frozenset) else frozenset()
     rest = tuple((view.time_s, other) for other in view.subjects[1:])
-    from_s = view.time_s + view.rules.control.actuation_delay_s
-    plan, proposal = planner(
+    plan, proposal, blocked, behind = planner(
         view.fleet, row, view.time_s, view.fastest_entry_mps, view.packed_rules
     )
-    blocked, behind = ramp_neighbours(view.fleet, row, from_s)
     if blocked or plan.rung == RUNG_HOLD:
         again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
         reasons = () if row in waiting else (held(row, plan),)

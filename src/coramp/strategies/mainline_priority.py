@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from coramp._kernel import FloatArray, kernel
 from coramp.core.fleet import Fleet, Proposal, empty_proposal
-from coramp.core.rules import unpacked
+from coramp.core.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.rungs import create, delay, merge_freely, no_merge, reach
@@ -23,19 +23,19 @@ from coramp.strategies.situation import (
     assess,
     conflict_position,
     gaps_by_preference,
+    ramp_neighbours,
 )
 
 
 @kernel
-def plan_with_mainline_priority(
+def first_that_helps(
     fleet: Fleet,
     subject: int,
     now_s: float,
     fastest_entry_mps: float,
-    packed_rules: FloatArray,
+    rules: Rules,
 ) -> tuple[MergePlan, Proposal]:
     """Returns the plan of the first rung that helps, and the trajectories that it proposes."""
-    rules = unpacked(packed_rules)
     proposal = empty_proposal()
     situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
     merge = merge_freely(fleet, proposal, situation, rules)
@@ -64,6 +64,21 @@ def plan_with_mainline_priority(
             ), proposal
     proposal.size[0] = 0
     return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal
+
+
+@kernel
+def plan_with_mainline_priority(
+    fleet: Fleet,
+    subject: int,
+    now_s: float,
+    fastest_entry_mps: float,
+    packed_rules: FloatArray,
+) -> tuple[MergePlan, Proposal, bool, int]:
+    """Returns the plan and its trajectories, and what ``ramp_neighbours`` tells."""
+    rules = unpacked(packed_rules)
+    plan, proposal = first_that_helps(fleet, subject, now_s, fastest_entry_mps, rules)
+    blocked, behind = ramp_neighbours(fleet, subject, now_s + rules.control.actuation_delay_s)
+    return plan, proposal, blocked, behind
 
 
 @dataclass(frozen=True)

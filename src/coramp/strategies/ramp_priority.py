@@ -33,6 +33,7 @@ from coramp.strategies.situation import (
     conflict_position,
     gap_bounds_m,
     gap_of_free_movement,
+    ramp_neighbours,
 )
 
 
@@ -95,15 +96,14 @@ def total_shift_m(fleet: Fleet, proposal: Proposal, rules: Rules) -> float:
 
 
 @kernel
-def plan_with_ramp_priority(
+def first_that_helps(
     fleet: Fleet,
     subject: int,
     now_s: float,
     fastest_entry_mps: float,
-    packed_rules: FloatArray,
+    rules: Rules,
 ) -> tuple[MergePlan, Proposal]:
     """Returns the plan of the first rung that helps, and the trajectories that it proposes."""
-    rules = unpacked(packed_rules)
     proposal = empty_proposal()
     situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
     merge = merge_freely(fleet, proposal, situation, rules)
@@ -124,6 +124,21 @@ def plan_with_ramp_priority(
             ), proposal
     proposal.size[0] = 0
     return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal
+
+
+@kernel
+def plan_with_ramp_priority(
+    fleet: Fleet,
+    subject: int,
+    now_s: float,
+    fastest_entry_mps: float,
+    packed_rules: FloatArray,
+) -> tuple[MergePlan, Proposal, bool, int]:
+    """Returns the plan and its trajectories, and what ``ramp_neighbours`` tells."""
+    rules = unpacked(packed_rules)
+    plan, proposal = first_that_helps(fleet, subject, now_s, fastest_entry_mps, rules)
+    blocked, behind = ramp_neighbours(fleet, subject, now_s + rules.control.actuation_delay_s)
+    return plan, proposal, blocked, behind
 
 
 @dataclass(frozen=True)

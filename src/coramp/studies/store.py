@@ -25,6 +25,8 @@ ROWS_AT_A_TIME = 1000
 """Runs that are held in memory as rows while the tables are made."""
 MARK = "study.json"
 PARTS = "parts"
+OURS = (MARK, PARTS, "runs.parquet", "streams.parquet", "tables.md", "capacity.png")
+"""What a study writes into its folder."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,8 @@ class Store:
             "versions": versions(),
         }
         mark = self.folder / MARK
-        if mark.exists():
-            found = read_json(mark)
-            if not isinstance(found, dict) or found.get("kind") != "study":
-                raise CorampError(f"{mark}: does not describe a study; give another folder")
+        found = self._description()
+        if found is not None:
             if found.get("result_version") != RESULT_VERSION:
                 raise CorampError(
                     f"{self.folder}: was written by another version of coramp (results "
@@ -74,12 +74,26 @@ class Store:
             return
         if self.folder.exists() and not self.folder.is_dir():
             raise CorampError(f"{self.folder}: is a file; give a folder")
-        if self.folder.exists() and any(self.folder.iterdir()):
+        if self.folder.exists() and any(f.name not in OURS for f in self.folder.iterdir()):
             raise CorampError(
                 f"{self.folder}: holds other files and no study; give another or an empty folder"
             )
         made_folder(self.folder)
         write_json(mark, content)
+
+    def _description(self) -> Row | None:
+        """What the folder says of itself, None where that is missing or no JSON.
+
+        Parts tell by themselves which runs they are of, so it can be written again.
+        """
+        mark = self.folder / MARK
+        try:
+            found = read_json(mark)
+        except CorampError:
+            return None
+        if not isinstance(found, dict) or found.get("kind") != "study":
+            raise CorampError(f"{mark}: does not describe a study; give another folder")
+        return found
 
     def part_path(self, spec: RunSpec) -> Path:
         """Returns where the part of a run lies."""

@@ -49,9 +49,11 @@ class Session:
         Session._free.acquire()
         try:
             libsumo.start([program, *options, "--step-length", repr(step_s), *extra])
-        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+        except BaseException as error:
             Session._free.release()
-            raise CorampError(f"SUMO: {error}") from error
+            if isinstance(error, libsumo.TraCIException | libsumo.FatalTraCIError):
+                raise CorampError(f"SUMO: {error}") from error
+            raise
         Session._owner = threading.get_ident()
 
     def __enter__(self) -> Self:
@@ -63,9 +65,11 @@ class Session:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        libsumo.close()
-        Session._owner = None
-        Session._free.release()
+        try:
+            libsumo.close()
+        finally:
+            Session._owner = None
+            Session._free.release()
 
     def step_to(self, step: int) -> None:
         """Executes all steps before ``step``."""
