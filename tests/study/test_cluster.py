@@ -52,7 +52,9 @@ def dask(tmp_path):
             *("--scheduler-file", str(contact)),
         )
     ]
-    while not contact.exists():
+    for _ in range(600):
+        if contact.exists():
+            break
         time.sleep(0.1)
     processes += [
         started(
