@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from coramp.audit.checker import Change, Vehicles, examine
+from coramp.audit.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
 from coramp.audit.reasons import (
     ACCEPTED,
     BACKWARDS,
@@ -702,3 +703,30 @@ def test_pairs_that_are_skipped_for_being_far_apart_change_no_verdict():
             assert found.least_margin_m == min(one.least_margin_m for one in singly)
             accepted += 1
     assert 50 < accepted < 350
+
+
+def _apart(mine, theirs, least):
+    return surely_apart(mine, envelope_on_mainline(mine, BOUNDS), theirs, 1.0, least, BOUNDS)
+
+
+def test_pair_is_only_skipped_if_its_margin_is_not_the_least():
+    rng = np.random.default_rng(9)
+    skipped = 0
+    for _ in range(200):
+        ways = [Way(way, length_m, merge_s) for way, merge_s, length_m in _busy_traffic(rng)]
+        for mine, theirs in zip(ways[::2], ways[1::2], strict=True):
+            code, margin_m = examine_pair(mine, theirs, 1.0, BOUNDS)
+            if code != ACCEPTED:
+                assert not _apart(mine, theirs, -math.inf)
+            elif margin_m < math.inf:
+                assert not _apart(mine, theirs, margin_m + 1e-9)
+                # the envelopes give away some metres, not tens of them
+                skipped += _apart(mine, theirs, margin_m - 30.0)
+    assert skipped > 100
+
+
+def test_pair_that_never_meets_on_the_mainline_is_skipped_and_one_on_the_ramp_is_not():
+    undecided, other = Way(R_WAY, 5.0, UNDECIDED), Way(Q_WAY, 5.0, UNDECIDED)
+    assert _apart(undecided, Way(X_WAY, 5.0, STREAM), math.inf)
+    assert not _apart(undecided, other, -math.inf)
+    assert not _apart(Way(MERGE, 5.0, 12.0), other, -math.inf)
