@@ -7,7 +7,6 @@ import pytest
 
 from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.plant import Nowhere
 from coramp.engines.outcomes import cap_step_of
 from coramp.loading import load_scenario
 from coramp.strategies.registry import strategy_named
@@ -35,7 +34,6 @@ def decision_times_ms(strategy, mainline, ramp, seeds):
             scenario.rules(),
             arrivals_of(scenario, seed),
             scenario.fastest_mainline_entry_mps,
-            Nowhere(),
         )
         coordinator.expect_arrivals()
         coordinator.run(cap_step_of(scenario))

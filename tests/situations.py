@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
-from coramp.coordination.plant import Arrival, Nowhere
+from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
@@ -77,7 +77,7 @@ def loop(scenario, arrivals, strategy, last_s=400.0):
     if isinstance(strategy, str):
         strategy = strategy_named(strategy)()
     coordinator = Coordinator(
-        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps, Nowhere()
+        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
     )
     coordinator.expect_arrivals()
     coordinator.run(round(last_s / STEP_S))

@@ -8,7 +8,7 @@ import polars as pl
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
-from coramp.coordination.plant import Arrival, Nowhere
+from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.metrics.schemas import TRAJECTORIES
 from coramp.metrics.tables import decisions_table
@@ -45,11 +45,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         for v in vehicles
     ]
     coordinator = Coordinator(
-        chosen(),
-        scenario.rules(),
-        arrivals,
-        scenario.fastest_mainline_entry_mps,
-        Nowhere(),
+        chosen(), scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
     )
     for number, vehicle in enumerate(vehicles):
         if not coordinator.place(number, vehicle.station_m, 0):

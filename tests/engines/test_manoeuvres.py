@@ -6,7 +6,7 @@ import pytest
 
 import coramp
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.plant import Arrival, Nowhere
+from coramp.coordination.plant import Arrival
 from coramp.core.fleet import empty_proposal
 from coramp.scenario import Scenario
 from coramp.snapshots import Snapshot, load_snapshot
@@ -57,7 +57,7 @@ def first_view(snapshot: Snapshot, scenario: Scenario) -> View:
         Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.vehicle.length_m)
         for v in vehicles
     ]
-    coordinator = Coordinator(onlooker, scenario.rules(), arrivals, 20.0, Nowhere())
+    coordinator = Coordinator(onlooker, scenario.rules(), arrivals, 20.0)
     for number, vehicle in enumerate(vehicles):
         assert coordinator.place(number, vehicle.station_m, 0)
     coordinator.decide_now(0)

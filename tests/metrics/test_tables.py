@@ -8,11 +8,8 @@ from coramp.coordination.coordinator import DecisionRecord, Refusal
 from coramp.metrics.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES
 from coramp.metrics.tables import (
     decisions_table,
-    speeds_table,
-    stream_figures,
     tables_of,
     trajectories_table,
-    vehicles_table,
 )
 from coramp.strategies.base import Explanation
 from tests.metrics import NEVER, PAPER, Car, outcome_of
@@ -46,7 +43,7 @@ class TestVehicles:
 
     @pytest.fixture
     def table(self):
-        return vehicles_table(outcome_of(self.CARS, end_s=100.0), PAPER)
+        return tables_of(outcome_of(self.CARS, end_s=100.0), PAPER).vehicles
 
     def test_columns_and_order_are_those_of_the_file(self, table):
         assert dict(table.schema) == VEHICLES
@@ -84,8 +81,7 @@ class TestVehicles:
         )
 
     def test_the_streams_figures_are_means_over_everybody(self, table):
-        outcome = outcome_of(self.CARS, end_s=100.0)
-        mainline = stream_figures(table, speeds_table(outcome), "mainline")
+        mainline, _ = tables_of(outcome_of(self.CARS, end_s=100.0), PAPER).streams
         assert (mainline["vehicles"], mainline["unserved"]) == (2, 1)
         assert mainline["delay_s"] == pytest.approx((3.0 + 50.0) / 2.0)
         assert mainline["waiting_s"] == pytest.approx(1.5)
@@ -93,7 +89,7 @@ class TestVehicles:
 
     def test_an_unserved_vehicle_makes_the_mean_worse_the_longer_it_is_left(self):
         means = [
-            vehicles_table(outcome_of(self.CARS, end_s=end_s), PAPER)["delay_s"].mean()
+            tables_of(outcome_of(self.CARS, end_s=end_s), PAPER).vehicles["delay_s"].mean()
             for end_s in (200.0, 300.0)
         ]
         assert means[1] - means[0] == pytest.approx(100.0 * 2 / 4)
@@ -105,7 +101,7 @@ def test_the_95th_percentile_lies_between_the_nearest_two():
         for k, delay in enumerate([0.0, 1.0, 2.0, 3.0, 10.0])
     ]
     outcome = outcome_of(cars, end_s=60.0)
-    figures = stream_figures(vehicles_table(outcome, PAPER), speeds_table(outcome), "mainline")
+    figures, _ = tables_of(outcome, PAPER).streams
     # 0.95 (5 - 1) = 3.8: eight tenths of the way from 3 to 10
     assert figures["delay_p95_s"] == pytest.approx(3.0 + 0.8 * 7.0)
     assert figures["delay_s"] == pytest.approx(3.2)
@@ -121,7 +117,7 @@ class TestSpeeds:
 
     @pytest.fixture
     def speeds(self):
-        return speeds_table(outcome_of(self.CARS, end_s=5.0))
+        return tables_of(outcome_of(self.CARS, end_s=5.0), PAPER).speeds
 
     def test_bins_hold_the_space_mean_speed_and_empty_ones_are_left_out(self, speeds):
         assert dict(speeds.schema) == SPEEDS
@@ -132,13 +128,12 @@ class TestSpeeds:
             ("ramp", 1.0, 9.0, 1),
         ]
 
-    def test_fluctuation_is_the_standard_deviation_over_bins(self, speeds):
-        table = vehicles_table(outcome_of(self.CARS, end_s=5.0), PAPER)
-        mainline = stream_figures(table, speeds, "mainline")
+    def test_fluctuation_is_the_standard_deviation_over_bins(self):
+        mainline, ramp = tables_of(outcome_of(self.CARS, end_s=5.0), PAPER).streams
         mean = (10.0 + 15.0 + 16.0) / 3.0
         variance = ((10.0 - mean) ** 2 + (15.0 - mean) ** 2 + (16.0 - mean) ** 2) / 3.0
         assert mainline["speed_std_mps"] == pytest.approx(math.sqrt(variance))
-        assert stream_figures(table, speeds, "ramp")["speed_std_mps"] == pytest.approx(0.0)
+        assert ramp["speed_std_mps"] == pytest.approx(0.0)
 
 
 def test_a_stream_without_vehicles_has_counts_but_no_figures():

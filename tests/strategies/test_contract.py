@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.plant import Nowhere
 from coramp.errors import CorampError
 from coramp.strategies.base import Decision, FollowTrajectory, ReleaseToDriver
 from coramp.strategies.registry import register, strategies, strategy_named
@@ -68,7 +67,7 @@ def test_total_deterministic_finite_and_pure(name, situation):
     scenario, arrivals, _ = situation
     watched = Watched(name)
     coordinator = Coordinator(
-        watched, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps, Nowhere()
+        watched, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
     )
     coordinator.expect_arrivals()
     coordinator.run(2000)

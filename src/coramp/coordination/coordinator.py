@@ -63,7 +63,10 @@ class Refusal:
 
 
 class Coordinator:
-    """Runs one strategy over given arrivals."""
+    """Runs one strategy over given arrivals.
+
+    Without a plant nobody carries the vehicles: the commitments are all there is.
+    """
 
     def __init__(
         self,
@@ -71,7 +74,7 @@ class Coordinator:
         rules: Rules,
         arrivals: Sequence[Arrival],
         fastest_entry_mps: float,
-        plant: Plant,
+        plant: Plant | None = None,
     ) -> None:
         road = rules.road
         self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(arrivals))
@@ -105,7 +108,8 @@ class Coordinator:
                     return
                 continue
             step = self._wakes[0][0]
-            self._plant.advance(step)
+            if self._plant is not None:
+                self._plant.advance(step)
             self._handle_wakes(step)
 
     def _admit(self, last_step: int) -> None:
@@ -122,24 +126,26 @@ class Coordinator:
                 return
 
     def _announce_entries(self) -> int:
-        """Tells the plant who has entered; returns the first step at which one is planned."""
+        """Tells who has entered; returns the first step at which one of them is planned."""
         new = slice(self._announced, len(self.ledger))
-        gate, book, first_due = self._gate, self.ledger.book, NEVER
-        columns = (
-            *(gate.row_arrival[new], gate.row_step[new], gate.row_due_step[new]),
-            *(book.first_piece[new], book.piece_count[new], book.merge_time_s[new]),
-        )
-        entries = zip(*(column.tolist() for column in columns), strict=True)
-        for row, (arrival, step, due, first, count, merge_s) in enumerate(entries, new.start):
-            self._plant.advance(step)
-            self._plant.enter(row, self._arrivals[arrival], step)
-            self._plant.follow(row, book.pieces[first : first + count], merge_s)
+        self._announced, first_due = new.stop, NEVER
+        self._tell_plant(new)
+        for row, due in enumerate(self._gate.row_due_step[new].tolist(), new.start):
             if due != NEVER:
                 self._due_step[row] = due
                 self._wake(due, row)
                 first_due = min(first_due, due)
-        self._announced = new.stop
         return first_due
+
+    def _tell_plant(self, new: slice) -> None:
+        if self._plant is None:
+            return
+        gate, ledger = self._gate, self.ledger
+        columns = (gate.row_arrival[new].tolist(), gate.row_step[new].tolist())
+        for row, (arrival, step) in enumerate(zip(*columns, strict=True), new.start):
+            self._plant.advance(step)
+            self._plant.enter(row, self._arrivals[arrival], step)
+            self._plant.follow(row, ledger.trajectory(row), ledger.merge_time_s(row))
 
     def entered(self) -> tuple[IntArray, IntArray]:
         """Returns, a row each, which arrival it is and at which step it entered."""
@@ -197,7 +203,8 @@ class Coordinator:
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self.ledger.commit(row, pieces, merge_time_s)
-        self._plant.follow(row, pieces, merge_time_s)
+        if self._plant is not None:
+            self._plant.follow(row, pieces, merge_time_s)
         if row in self._due_step:
             self._plan_when_due(row, pieces, step)
 

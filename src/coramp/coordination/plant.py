@@ -32,16 +32,3 @@ class Plant(Protocol):
     def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
         """Makes a vehicle follow the pieces from their first time on; merge at that time."""
         ...
-
-
-class Nowhere:
-    """A plant that carries nobody: commitments are all there is."""
-
-    def advance(self, step: int) -> None:
-        """Does nothing."""
-
-    def enter(self, row: int, arrival: Arrival, step: int) -> None:
-        """Does nothing."""
-
-    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
-        """Does nothing."""

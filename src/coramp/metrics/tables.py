@@ -1,15 +1,15 @@
 """From an outcome to the tables that a run leaves behind and the figures that sum it up."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
 from coramp.metrics.motion import BIN_S, binned_motion, fuel_of_each_l, hardest_braking_mps2
@@ -30,24 +30,45 @@ from coramp.strategies.situation import RUNGS
 Row = dict[str, Any]
 
 
+Columns = Mapping[str, Any]
+"""Columns of a table by name: arrays, nan for what is not there."""
+
+
 @dataclass(frozen=True)
 class RunTables:
-    """The tables of a run; trajectories and decisions only where there were plans."""
+    """The figures of a run, and its tables, made when they are asked for.
+
+    There are trajectories and decisions only where there were plans.
+    """
 
     outcome: Outcome
-    vehicles: pl.DataFrame
-    speeds: pl.DataFrame
+    vehicle_columns: Columns
+    speed_columns: Columns
     metrics: Row
     streams: list[Row]
 
     @cached_property
+    def vehicles(self) -> pl.DataFrame:
+        """One row a vehicle."""
+        columns = dict(self.vehicle_columns)
+        columns["stream"] = _stream_names(columns["stream"])
+        return _frame(VEHICLES, **columns)
+
+    @cached_property
+    def speeds(self) -> pl.DataFrame:
+        """One row a stream and bin of 1 s in which there were vehicles."""
+        columns = dict(self.speed_columns)
+        columns["stream"] = _stream_names(columns["stream"])
+        return _frame(SPEEDS, **columns)
+
+    @cached_property
     def trajectories(self) -> pl.DataFrame | None:
-        """One row a driven piece, made when it is asked for."""
+        """One row a driven piece."""
         return trajectories_table(self.outcome) if self.outcome.cooperative else None
 
     @cached_property
     def decisions(self) -> pl.DataFrame | None:
-        """One row a decision, made when it is asked for."""
+        """One row a decision."""
         outcome = self.outcome
         if not outcome.cooperative:
             return None
@@ -58,8 +79,8 @@ class RunTables:
 
 def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
     """Returns all tables and figures of a run."""
-    vehicles, speeds = vehicles_table(outcome, scenario), speeds_table(outcome)
-    streams = [stream_figures(vehicles, speeds, name) for name in STREAMS]
+    vehicles, speeds = vehicle_columns(outcome, scenario), speed_columns(outcome)
+    streams = [stream_figures(vehicles, speeds, stream) for stream in range(len(STREAMS))]
     metrics = {
         **_stream_metrics(streams),
         **safety_figures(outcome, scenario),
@@ -68,8 +89,8 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
     return RunTables(outcome, vehicles, speeds, metrics, streams)
 
 
-def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
-    """Returns one row a vehicle.
+def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
+    """Returns one entry a vehicle; ``stream`` is its place in ``STREAMS``.
 
     Delay is from scheduled entry to exit, less free flow; for a vehicle that is not out when the
     run is cut off it counts up to then, and is never below 0.
@@ -86,28 +107,27 @@ def vehicles_table(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
     travel_s = until_s - entry_s
     mean_speed_mps = np.full(len(passages), np.nan)
     np.divide(way_m + scenario.mainline.end_m, travel_s, out=mean_speed_mps, where=finished)
-    return _frame(
-        VEHICLES,
-        vehicle_id=passages.vehicle_id,
-        stream=_stream_names(passages.on_ramp),
-        scheduled_s=passages.scheduled_s,
-        entry_s=passages.entry_s,
-        exit_s=passages.exit_s,
-        waiting_s=entry_s - passages.scheduled_s,
-        travel_s=travel_s,
-        free_flow_s=free_flow_s,
-        delay_s=np.maximum(
+    return {
+        "vehicle_id": passages.vehicle_id,
+        "stream": passages.on_ramp.astype(np.int64),
+        "scheduled_s": passages.scheduled_s,
+        "entry_s": passages.entry_s,
+        "exit_s": passages.exit_s,
+        "waiting_s": entry_s - passages.scheduled_s,
+        "travel_s": travel_s,
+        "free_flow_s": free_flow_s,
+        "delay_s": np.maximum(
             until_s - passages.scheduled_s - free_flow_s, np.where(finished, -np.inf, 0.0)
         ),
-        mean_speed_mps=mean_speed_mps,
-        fuel_l=fuel_of_each_l(pieces.first, pieces.rows, until_s),
-        finished=finished,
-        plan_error_m=passages.plan_error_m,
-    )
+        "mean_speed_mps": mean_speed_mps,
+        "fuel_l": fuel_of_each_l(pieces.first, pieces.rows, until_s),
+        "finished": finished,
+        "plan_error_m": passages.plan_error_m,
+    }
 
 
-def _stream_names(on_ramp: BoolArray) -> list[str]:
-    return [STREAMS[ramp] for ramp in on_ramp.tolist()]
+def _stream_names(streams: IntArray) -> list[str]:
+    return [STREAMS[stream] for stream in streams.tolist()]
 
 
 def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
@@ -115,7 +135,7 @@ def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
     return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
-def speeds_table(outcome: Outcome) -> pl.DataFrame:
+def speed_columns(outcome: Outcome) -> Columns:
     """Returns the space-mean speed of each stream in bins of 1 s, where there are vehicles."""
     passages, pieces = outcome.passages, outcome.pieces
     until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
@@ -124,13 +144,12 @@ def speeds_table(outcome: Outcome) -> pl.DataFrame:
         pieces.first, pieces.rows, until_s, passages.on_ramp, bins
     )
     stream, used = np.nonzero(time_s > 0.0)
-    return _frame(
-        SPEEDS,
-        stream=[STREAMS[k] for k in stream.tolist()],
-        time_s=used * BIN_S,
-        mean_speed_mps=distance_m[stream, used] / time_s[stream, used],
-        vehicles=vehicles[stream, used],
-    )
+    return {
+        "stream": stream,
+        "time_s": used * BIN_S,
+        "mean_speed_mps": distance_m[stream, used] / time_s[stream, used],
+        "vehicles": vehicles[stream, used],
+    }
 
 
 def trajectories_table(outcome: Outcome) -> pl.DataFrame:
@@ -178,22 +197,26 @@ def decisions_table(
     return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
-def stream_figures(vehicles: pl.DataFrame, speeds: pl.DataFrame, stream: str) -> Row:
-    """Returns the figures of one stream; null where it has no vehicles."""
-    of_stream = vehicles.filter(stream=stream)
-    bins = speeds.filter(stream=stream)["mean_speed_mps"]
-    speed = of_stream["mean_speed_mps"].drop_nulls()
+def stream_figures(vehicles: Columns, speeds: Columns, stream: int) -> Row:
+    """Returns the figures of one stream, by its place in ``STREAMS``; None for want of vehicles."""
+    own = vehicles["stream"] == stream
+    finished, delay_s = vehicles["finished"][own], vehicles["delay_s"][own]
+    binned_mps = speeds["mean_speed_mps"][speeds["stream"] == stream]
     return {
-        "stream": stream,
-        "vehicles": of_stream.height,
-        "unserved": of_stream.height - int(of_stream["finished"].sum()),
-        "delay_s": of_stream["delay_s"].mean(),
-        "delay_p95_s": of_stream["delay_s"].quantile(0.95, "linear"),
-        "waiting_s": of_stream["waiting_s"].mean(),
-        "speed_mps": speed.mean(),
-        "speed_std_mps": bins.std(ddof=0) if bins.len() else None,
-        "fuel_l": of_stream["fuel_l"].sum(),
+        "stream": STREAMS[stream],
+        "vehicles": len(finished),
+        "unserved": len(finished) - int(finished.sum()),
+        "delay_s": _of_some(np.mean, delay_s),
+        "delay_p95_s": _of_some(partial(np.quantile, q=0.95), delay_s),
+        "waiting_s": _of_some(np.mean, vehicles["waiting_s"][own]),
+        "speed_mps": _of_some(np.mean, vehicles["mean_speed_mps"][own][finished]),
+        "speed_std_mps": _of_some(np.std, binned_mps),
+        "fuel_l": float(vehicles["fuel_l"][own].sum()),
     }
+
+
+def _of_some(statistic: Callable[[FloatArray], Any], values: FloatArray) -> float | None:
+    return float(statistic(values)) if len(values) else None
 
 
 def _stream_metrics(streams: list[Row]) -> Row:

@@ -4,7 +4,6 @@ import numpy as np
 
 from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.plant import Nowhere
 from coramp.engines.outcomes import cap_step_of, cooperative_outcome, step_after_last_exit
 from coramp.records import Outcome
 from coramp.scenario import Scenario
@@ -19,7 +18,7 @@ def run_exact(scenario: Scenario, strategy: Strategy, seed: int) -> Outcome:
     """
     arrivals = arrivals_of(scenario, seed)
     coordinator = Coordinator(
-        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps, Nowhere()
+        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
     )
     coordinator.expect_arrivals()
     cap_step, step_s = cap_step_of(scenario), scenario.control.step_s
