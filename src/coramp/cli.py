@@ -270,6 +270,8 @@ def _report(error: Exception) -> int:
             code, messages = USAGE, (f"{text}; see {command} --help",)
         case typer.Abort():
             code, messages = STOPPED, ("stopped",)
+        case OSError() if error.filename:
+            code, messages = WRONG, (f"{error.filename}: {error.strerror}",)
         case _:
             text = f"unexpected {type(error).__name__}: {error}; add {DEBUG} to see where"
             code, messages = WRONG, (text,)

@@ -1,5 +1,6 @@
 """Writing result files so that none is ever half there, and owning the folders they lie in."""
 
+import io
 import json
 import os
 import shutil
@@ -27,8 +28,10 @@ def write_json(path: Path, data: Any) -> None:
 
 def write_parquet(path: Path, frame: pl.DataFrame) -> None:
     """Writes a table."""
+    content = io.BytesIO()
+    frame.write_parquet(content)
     with _replacing(path) as temporary:
-        frame.write_parquet(temporary)
+        temporary.write_bytes(content.getvalue())
 
 
 @contextmanager

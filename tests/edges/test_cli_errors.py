@@ -479,6 +479,13 @@ class TestFolders:
         assert line.startswith("Error: o: was written by another version of coramp")
 
 
+@pytest.mark.parametrize("what", [("run", "paper", "--horizon", "5"), ("study", "paper")])
+def test_a_folder_whose_name_is_too_long_is_told(here, what):
+    (line,) = refused(here, *what, "--out", 300 * "a")
+    assert line.startswith("Error: ")
+    assert line.endswith("aaa: File name too long")
+
+
 def test_keeping_sumos_files_needs_a_folder(here):
     assert refused(here, "run", "paper", "--horizon", "5", "--keep-sumo") == [
         "Error: --keep-sumo: there is no folder to keep files in; give --out DIR"

@@ -1,3 +1,4 @@
+import errno
 import os
 import signal
 import subprocess
@@ -353,4 +354,25 @@ def test_a_study_interrupted_between_two_runs_keeps_the_first(whole, tmp_path, m
     assert len(parts_of(tmp_path / "o")) == 2
     result, states, executed = start(tmp_path / "o", monkeypatch)
     assert (states[0].skipped, len(executed)) == (2, 4)
+    assert apart_from_time(result.runs).equals(apart_from_time(whole.runs))
+
+
+def test_a_full_disk_stops_a_study_and_keeps_what_was_done(whole, copied, monkeypatch, recwarn):
+    for part in list((copied / "parts").iterdir()):
+        part.unlink()
+    synced = []
+
+    def full_after_three(descriptor):
+        synced.append(descriptor)
+        if len(synced) > 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("coramp.files.os.fsync", full_after_three)
+        with pytest.raises(CorampError, match="No space left on device; runs that are done are"):
+            start(copied, jobs=2)
+    assert not recwarn.list
+    assert len(list((copied / "parts").iterdir())) == 3
+    result, _, took = start(copied, monkeypatch)
+    assert len(took) == RUNS_OF_GRID - 3
     assert apart_from_time(result.runs).equals(apart_from_time(whole.runs))

@@ -2,7 +2,9 @@
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,10 +72,25 @@ def run_missing(
     skipped = len(specs) - len(missing)
     failed = 0
     report(Progress(len(specs), 0, skipped, 0, damaged))
-    for done, (spec, part) in enumerate(_results(missing, jobs), 1):
-        store.write(spec, part)
-        failed += part.run["status"] == "failed"
-        report(Progress(len(specs), done, skipped, failed, damaged, part))
+    with _quietly_closed(_results(missing, jobs)) as results:
+        for done, (spec, part) in enumerate(results, 1):
+            store.write(spec, part)
+            failed += part.run["status"] == "failed"
+            report(Progress(len(specs), done, skipped, failed, damaged, part))
+
+
+Results = Generator[tuple[RunSpec, Part], None, None]
+
+
+@contextmanager
+def _quietly_closed(results: Results) -> Iterator[Results]:
+    """Gives up what is under way where a study stops, without joblib's warning of that."""
+    try:
+        yield results
+    finally:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "[0-9]+ tasks", UserWarning)
+            results.close()
 
 
 def run_searches(
@@ -107,7 +124,7 @@ def run_searches(
     return sorted(taken.values(), key=sort_key)
 
 
-def _results(specs: Sequence[RunSpec], jobs: int) -> Iterator[tuple[RunSpec, Part]]:
+def _results(specs: Sequence[RunSpec], jobs: int) -> Results:
     """Yields runs as they are done.
 
     Where a worker dies, what it had not done is run again; what is left after some deaths runs

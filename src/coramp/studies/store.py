@@ -124,7 +124,12 @@ class Store:
         """Writes the part of a run."""
         run, streams = _encoded(part.run), [_encoded(row) for row in part.streams]
         content = {"run": run, "streams": streams, "sha256": _checksum(run, streams)}
-        write_json(self.part_path(spec), content)
+        try:
+            write_json(self.part_path(spec), content)
+        except CorampError as error:
+            raise CorampError(
+                f"{error}; runs that are done are kept, start again to go on"
+            ) from error
 
     def parts(self, specs: Iterable[RunSpec]) -> Iterator[Part]:
         """Yields what there is of the given runs, failed ones too, in their order."""
