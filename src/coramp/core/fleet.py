@@ -73,8 +73,14 @@ def committed(fleet: Fleet, row: int) -> FloatArray:
 @kernel
 def entry_of(proposal: Proposal, row: int) -> int:
     """Returns the index of ``row`` in the proposal, -1 if it is not changed."""
-    for k in range(proposal.size[0]):
-        if proposal.rows[k] == row:
+    return place_among(proposal.rows, proposal.size[0], row)
+
+
+@kernel
+def place_among(rows: IntArray, count: int, row: int) -> int:
+    """Returns the place of ``row`` among the first ``count`` of ``rows``, -1 if it is not there."""
+    for k in range(count):
+        if rows[k] == row:
             return k
     return -1
 

@@ -10,8 +10,8 @@ from coramp.core.fleet import (
     Proposal,
     committed,
     entry_of,
-    merge_time_under_s,
     pair_margin_m,
+    place_among,
     proposed,
     trajectory_under,
 )
@@ -212,10 +212,12 @@ def find_unsafe_pair(
         if not (math.isinf(one_merge_s) and one_merge_s > 0.0):
             low_m, high_m = intercept_range_m(one, max(from_s, one_merge_s), v0)
         for other_row in fleet.live:
-            other_entry = entry_of(proposal, other_row)
+            other_entry = place_among(proposal.rows, proposal.size[0], other_row)
             if other_row == row or 0 <= other_entry < entry:
                 continue
-            other_merge_s = merge_time_under_s(fleet, proposal, other_row)
+            other_merge_s = fleet.merge_time_s[other_row]
+            if other_entry >= 0:
+                other_merge_s = proposal.merge_time_s[other_entry]
             if other_entry < 0 and min(one_merge_s, other_merge_s) <= from_s:
                 ahead_m = fleet.lowest_m[other_row] - fleet.length_m[other_row] - high_m
                 behind_m = low_m - fleet.length_m[row] - fleet.highest_m[other_row]

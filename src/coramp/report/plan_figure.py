@@ -1,20 +1,35 @@
 """The time-space diagram of a plan, before and after."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from coramp._kernel import FloatArray
 from coramp.core.trajectory import station_and_speed
 from coramp.errors import CorampError
 from coramp.planning import PlannedSnapshot
+from coramp.report.style import (
+    BLUE,
+    GREY,
+    VERMILION,
+    YELLOW,
+    grid,
+    legend_below,
+    new_figure,
+    save_figure,
+)
 
-RAMP_COLOUR, MOVED_COLOUR, MAINLINE_COLOUR = "#d55e00", "#0072b2", "#7f7f7f"
-"""From the Okabe-Ito palette, which colour-blind readers can tell apart."""
+RAMP_COLOUR, MOVED_COLOUR, MAINLINE_COLOUR = VERMILION, BLUE, GREY
 POINTS = 400
+NEAR_NAMES = 0.04
+"""Names nearer to each other than this share of the height go into columns."""
+NAME_WIDTH_PT = 14.0
+COLUMNS = ["time_s", "station_m", "speed_mps", "accel_mps2"]
 
 
 def save_plan_figure(planned: PlannedSnapshot, path: Path) -> None:
@@ -26,54 +41,119 @@ def save_plan_figure(planned: PlannedSnapshot, path: Path) -> None:
     if path.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise CorampError(f"--plot: {path}: the ending says no format; {allowed}")
     try:
-        plan_figure(planned).savefig(path, dpi=150)
-    except OSError as error:
-        raise CorampError(
-            f"--plot: {path}: cannot be written: {error.strerror}; {allowed}"
-        ) from error
+        save_figure(plan_figure(planned), path, dpi=150)
+    except CorampError as error:
+        reason = str(error.messages[0]).rsplit("; ", 1)[0]
+        raise CorampError(f"--plot: {reason}; {allowed}") from error
 
 
 def plan_figure(planned: PlannedSnapshot) -> Figure:
     """Returns station over time of every vehicle, before the decisions and after them."""
-    mpl.rcParams["svg.fonttype"] = "none"
-    figure = Figure(figsize=(11, 5.5), layout="constrained")
+    figure = new_figure(11, 5.5)
     before, after = figure.subplots(1, 2, sharex=True, sharey=True)
-    moved = {name for ids in planned.decisions["adjusted_vehicle_ids"].to_list() for name in ids}
-    merges = planned.decisions.filter(pl.col("merge_time_s").is_not_null())
-    latest = merges["merge_time_s"].max()
-    until_s = float(latest) + 4.0 if isinstance(latest, float) else 20.0
-    _draw(before, planned.before, until_s, moved)
-    _draw(after, planned.after, until_s, moved)
-    after.scatter(
-        merges["merge_time_s"],
-        merges["merge_station_m"],
-        color=RAMP_COLOUR,
-        zorder=3,
-        label="merge",
-    )
-    lane_m = planned.scenario.ramp.acceleration_lane_m
+    until_s = end_of_interest_s(planned)
+    moved = moved_vehicles(planned)
+    draw_trajectories(before, planned.before, until_s, moved)
+    draw_trajectories(after, planned.after, until_s, moved)
+    draw_merges(after, planned)
     for axes, title in ((before, "before"), (after, f"after: {planned.strategy}")):
-        axes.axhspan(0.0, lane_m, color="#f0e442", alpha=0.25, label="acceleration lane")
+        draw_acceleration_lane(axes, planned)
         axes.set(title=title, xlabel="time (s)", xlim=(0.0, until_s))
-        axes.grid(alpha=0.3)
+        name_lines(axes)
+    grid(before, after)
     before.set_ylabel("station of the front bumper (m)")
-    handles, labels = after.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=len(unique))
+    legend_below(figure, [after], 5)
     return figure
 
 
-def _draw(axes: Axes, trajectories: pl.DataFrame, until_s: float, moved: set[str]) -> None:
-    times_s = np.linspace(0.0, until_s, POINTS)
-    columns = ["time_s", "station_m", "speed_mps", "accel_mps2"]
+def end_of_interest_s(planned: PlannedSnapshot) -> float:
+    """Returns the time (s) up to which diagrams of a plan run: 4 s after the last merge."""
+    latest = planned.decisions["merge_time_s"].max()
+    return float(latest) + 4.0 if isinstance(latest, float) else 20.0
+
+
+def moved_vehicles(planned: PlannedSnapshot) -> set[str]:
+    """Returns the vehicles that move for another one."""
+    return {name for ids in planned.decisions["adjusted_vehicle_ids"].to_list() for name in ids}
+
+
+def pieces_of_each(trajectories: pl.DataFrame) -> Iterator[tuple[str, FloatArray, bool]]:
+    """Yields each vehicle's name, its pieces as in ``core.trajectory``, and if it is on a ramp."""
     for (name,), pieces in trajectories.group_by(["vehicle_id"], maintain_order=True):
-        rows = np.ascontiguousarray(pieces.select(columns).to_numpy())
+        rows = np.ascontiguousarray(pieces.select(COLUMNS).to_numpy())
+        yield str(name), rows, "ramp" in pieces["lane"]
+
+
+def draw_acceleration_lane(axes: Axes, planned: PlannedSnapshot) -> None:
+    """Shades the stations of the acceleration lane."""
+    lane_m = planned.scenario.ramp.acceleration_lane_m
+    axes.axhspan(0.0, lane_m, color=YELLOW, alpha=0.25, label="acceleration lane")
+
+
+def draw_merges(axes: Axes, planned: PlannedSnapshot) -> None:
+    """Marks when and where ramp vehicles merge."""
+    merges = planned.decisions.filter(pl.col("merge_time_s").is_not_null())
+    times_s, stations_m = merges["merge_time_s"], merges["merge_station_m"]
+    axes.scatter(times_s, stations_m, color=RAMP_COLOUR, zorder=3, label="merge")
+
+
+def draw_trajectories(
+    axes: Axes, trajectories: pl.DataFrame, until_s: float, moved: set[str]
+) -> None:
+    """Draws station (m) over time (s) of all vehicles, one line each; its gid is their name."""
+    times_s = np.linspace(0.0, until_s, POINTS)
+    for name, rows, on_ramp in pieces_of_each(trajectories):
         stations_m = [station_and_speed(rows, time_s)[0] for time_s in times_s]
-        if "ramp" in pieces["lane"]:
+        if on_ramp:
             colour, label, width = RAMP_COLOUR, "ramp vehicle", 2.0
         elif name in moved:
             colour, label, width = MOVED_COLOUR, "moves aside", 1.6
         else:
             colour, label, width = MAINLINE_COLOUR, "mainline vehicle", 1.0
-        axes.plot(times_s, stations_m, color=colour, linewidth=width, label=label)
-        axes.annotate(str(name), (times_s[0], stations_m[0]), fontsize=7, color=colour)
+        axes.plot(times_s, stations_m, color=colour, linewidth=width, label=label, gid=name)
+
+
+def name_lines(axes: Axes) -> None:
+    """Writes each vehicle's name beside the right edge, further out where lines are close.
+
+    Lines that leave through the upper edge are named there.
+    """
+    edge_s, (low_m, high_m) = axes.get_xlim()[1], axes.get_ylim()
+    ends = []
+    for line in axes.get_lines():
+        times_s, stations_m = (np.asarray(data, dtype=float) for data in line.get_data())
+        ends.append((float(np.interp(edge_s, times_s, stations_m)), line))
+    last_m, column = -np.inf, 0
+    for station_m, line in sorted(ends, key=lambda end: end[0]):
+        if station_m > high_m:
+            _name_at_the_top(axes, line, high_m)
+        if not low_m <= station_m <= high_m:
+            continue
+        column = column + 1 if station_m - last_m < NEAR_NAMES * (high_m - low_m) else 0
+        last_m = station_m
+        axes.annotate(
+            str(line.get_gid()),
+            (edge_s, station_m),
+            (3.0 + NAME_WIDTH_PT * column, 0.0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+            color=line.get_color(),
+            annotation_clip=False,
+        )
+
+
+def _name_at_the_top(axes: Axes, line: Line2D, high_m: float) -> None:
+    times_s, stations_m = (np.asarray(data, dtype=float) for data in line.get_data())
+    leaves_s = float(np.interp(high_m, stations_m, times_s))
+    if leaves_s > axes.get_xlim()[0]:
+        axes.annotate(
+            str(line.get_gid()),
+            (leaves_s, high_m),
+            (-8.0, -3.0),
+            textcoords="offset points",
+            ha="right",
+            va="top",
+            fontsize=7.5,
+            color=line.get_color(),
+        )

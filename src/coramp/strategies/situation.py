@@ -234,15 +234,39 @@ def gap_bounds_m(fleet: Fleet, situation: Situation, k: int) -> tuple[float, flo
     no rear one. The lowest exceeds the highest where the gap is too small. Nowhere may the merge
     bother a vehicle that is yet to enter.
     """
-    low_m = situation.known_m
+    own_m = fleet.length_m[situation.subject] + situation.clearance_m
+    return bounds_between_m(
+        situation.order,
+        situation.intercepts_m,
+        fleet.length_m,
+        k,
+        situation.known_m,
+        own_m,
+        situation.clearance_m,
+    )
+
+
+@kernel
+def bounds_between_m(
+    order: IntArray,
+    intercepts_m: FloatArray,
+    length_m: FloatArray,
+    k: int,
+    known_m: float,
+    own_m: float,
+    clearance_m: float,
+) -> tuple[float, float]:
+    """Returns the bounds of ``gap_bounds_m``; ``own_m`` is the subject's length and clearance.
+
+    For loops over many gaps: handing whole tuples of arrays to a kernel costs more than it does.
+    """
+    low_m = known_m
     high_m = math.inf
-    if k < len(situation.order):
-        low_m = max(low_m, situation.intercepts_m[k])
-    low_m += fleet.length_m[situation.subject] + situation.clearance_m
+    if k < len(order):
+        low_m = max(low_m, intercepts_m[k])
     if k > 0:
-        front = situation.order[k - 1]
-        high_m = situation.intercepts_m[k - 1] - fleet.length_m[front] - situation.clearance_m
-    return low_m, high_m
+        high_m = intercepts_m[k - 1] - length_m[order[k - 1]] - clearance_m
+    return low_m + own_m, high_m
 
 
 @kernel
@@ -252,17 +276,37 @@ def gaps_by_preference(fleet: Fleet, situation: Situation, conflict: int) -> Int
     The distance is that from free movement to where the subject would fit, whether or not the gap
     is large enough.
     """
-    count = len(situation.order) + 1
-    distances_m = np.empty(count)
-    for k in range(count):
-        low_m, high_m = gap_bounds_m(fleet, situation, k)
+    order, intercepts_m, length_m = situation.order, situation.intercepts_m, fleet.length_m
+    free_m, known_m, clearance_m = situation.free_m, situation.known_m, situation.clearance_m
+    own_m = length_m[situation.subject] + clearance_m
+    distances_m = np.empty(len(order) + 1)
+    for k in range(len(distances_m)):
+        low_m, high_m = bounds_between_m(
+            order, intercepts_m, length_m, k, known_m, own_m, clearance_m
+        )
         if low_m > high_m:
             low_m = high_m = 0.5 * (low_m + high_m)
-        distances_m[k] = max(0.0, low_m - situation.free_m, situation.free_m - high_m)
+        distances_m[k] = max(0.0, low_m - free_m, free_m - high_m)
     if conflict >= 0:
         distances_m[conflict] = -2.0
         distances_m[conflict + 1] = -1.0
-    return np.argsort(distances_m, kind="mergesort")
+    return ascending_order(distances_m)
+
+
+@kernel
+def ascending_order(values: FloatArray) -> IntArray:
+    """Returns the places of ``values``, smallest first, equal ones as they stand.
+
+    By insertion, which is quick for the few dozen vehicles of a zone.
+    """
+    places = np.empty(len(values), np.int64)
+    for n in range(len(values)):
+        k = n
+        while k > 0 and values[places[k - 1]] > values[n]:
+            places[k] = places[k - 1]
+            k -= 1
+        places[k] = n
+    return places
 
 
 @kernel
