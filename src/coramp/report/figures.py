@@ -1,0 +1,77 @@
+"""All figures: the paper's, from our runs, and ours; as SVG and PNG files."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from coramp.files import made_folder
+from coramp.loading import load_scenario
+from coramp.planning import plan_snapshot
+from coramp.report.capacity_figure import capacity_figure
+from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
+from coramp.report.formula_figures import collision_figure, fuel_figure
+from coramp.report.road_figure import road_figure
+from coramp.report.run_figures import DrawnRun, margin_figure, speed_figure
+from coramp.report.sensitivity_figure import sensitivity_figure
+from coramp.report.study_folder import StoredStudy
+from coramp.report.style import save_figure
+from coramp.report.worked_example import positions_figure, time_space_figure
+from coramp.snapshots import load_snapshot
+
+FORMATS = ("svg", "png")
+SCENARIO, EXAMPLE = "paper", "example"
+CAPACITY_LEFT_OUT = (
+    "capacity is not drawn: its study takes some ten minutes; run coramp study capacity, then add "
+    "--study out/capacity"
+)
+
+
+@dataclass(frozen=True)
+class FigureSet:
+    """The figures that were drawn: each name with its files, and what was left out and why."""
+
+    folder: Path
+    files: Mapping[str, tuple[Path, ...]]
+    left_out: tuple[str, ...]
+
+
+def save_figures(
+    folder: Path, studies: Mapping[str, StoredStudy], runs: Sequence[DrawnRun]
+) -> FigureSet:
+    """Writes every figure into a folder, in each of the formats.
+
+    ``studies`` are by layout: ``paper`` and ``sensitivity`` must be there, ``capacity`` may.
+    Raises CorampError where a file cannot be written.
+    """
+    made_folder(folder)
+    files = {}
+    for name, draw in _catalogue(studies, runs):
+        figure = draw()
+        files[name] = tuple(save_figure(figure, folder / f"{name}.{end}") for end in FORMATS)
+    return FigureSet(folder, files, () if "capacity" in studies else (CAPACITY_LEFT_OUT,))
+
+
+def _catalogue(
+    studies: Mapping[str, StoredStudy], runs: Sequence[DrawnRun]
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Every figure's name with what draws it, in the order of the paper, then ours."""
+    scenario, snapshot = load_scenario(SCENARIO), load_snapshot(EXAMPLE)
+    mainline = plan_snapshot(snapshot, "mainline-priority")
+    ramp = plan_snapshot(snapshot, "ramp-priority")
+    by_flow = studies["paper"].runs
+    yield "fig04-collision-acceleration", collision_figure
+    yield "fig06-09-positions", lambda: positions_figure(mainline, ramp)
+    yield "fig07-11-time-space", lambda: time_space_figure(mainline)
+    yield "fig13-road", lambda: road_figure(scenario)
+    yield "fig14-mainline-speed", lambda: speed_figure(runs, "mainline")
+    yield "fig15-ramp-speed", lambda: speed_figure(runs, "ramp")
+    yield "fig16-fuel", fuel_figure
+    yield "delay-by-flow", lambda: delay_figure(by_flow)
+    yield "gain-by-flow", lambda: gain_figure(by_flow)
+    yield "rungs-by-flow", lambda: rung_figure(by_flow)
+    yield "margins", lambda: margin_figure(runs, scenario.safety.execution_allowance_m)
+    yield "sensitivity", lambda: sensitivity_figure(studies["sensitivity"].runs)
+    if "capacity" in studies:
+        yield "capacity", lambda: capacity_figure(studies["capacity"].runs)

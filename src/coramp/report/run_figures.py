@@ -1,0 +1,123 @@
+"""What single runs say: mean speed over time (Fig. 14, 15), and margins of decisions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from coramp.report.style import BLACK, grid, legend_below, look_of, new_figure
+
+SMOOTH_S = 60
+"""Over how many bins of 1 s the bold lines are means."""
+
+
+@dataclass(frozen=True)
+class DrawnRun:
+    """A run that is drawn: who, at which flows (veh/h), with what seed; speeds and decisions."""
+
+    strategy: str
+    drivers: str | None
+    mainline_veh_h: float
+    ramp_veh_h: float
+    seed: int
+    horizon_s: float
+    speeds: pl.DataFrame
+    decisions: pl.DataFrame | None
+
+
+def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
+    """Returns a stream's mean speed (m/s) over time (s), a diagram a ramp flow (Fig. 14, 15).
+
+    Faint lines are bins of 1 s, bold ones means over a minute; the runs of the first seed are
+    drawn.
+    """
+    first = [run for run in runs if run.seed == min(r.seed for r in runs)]
+    ramps = sorted({run.ramp_veh_h for run in first})
+    figure = new_figure(9.0, 2.0 * len(ramps) + 0.6)
+    diagrams = figure.subplots(len(ramps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axes, ramp in zip(diagrams, ramps, strict=True):
+        here = [run for run in first if run.ramp_veh_h == ramp]
+        for run in here:
+            _draw_speed(axes, run, stream)
+        axes.set(
+            title=f"{here[0].mainline_veh_h:g} + {ramp:g} veh/h",
+            ylabel=f"{stream} speed (m/s)",
+            xlim=(0.0, max(run.horizon_s for run in here)),
+        )
+    grid(*diagrams)
+    diagrams[-1].set_xlabel("time (s)")
+    legend_below(figure, diagrams, 4)
+    return figure
+
+
+def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
+    look = look_of(run.strategy, run.drivers)
+    own = run.speeds.filter(pl.col("stream") == stream, pl.col("time_s") < run.horizon_s)
+    times_s, speeds_mps = own["time_s"].to_numpy(), own["mean_speed_mps"].to_numpy()
+    axes.plot(times_s, speeds_mps, color=look.colour, alpha=0.25, linewidth=0.6)
+    smooth_mps = own["mean_speed_mps"].rolling_mean(SMOOTH_S, min_samples=1, center=True)
+    axes.plot(
+        times_s,
+        smooth_mps,
+        color=look.colour,
+        linestyle=look.line,
+        marker=look.marker,
+        markevery=max(1, len(times_s) // 12),
+        label=look.label,
+    )
+
+
+def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
+    """Returns how many decisions (%) have at most a margin (m) over the safe distance.
+
+    The margin of a decision is the least of all vehicles that it changes to all others, as the
+    checker computed it before the plan was committed; it asks for ``allowance_m`` of every plan.
+    A diagram a ramp flow, a line a strategy, decisions of all seeds together.
+    """
+    cooperative = [run for run in runs if run.decisions is not None]
+    ramps = sorted({run.ramp_veh_h for run in cooperative})
+    figure = new_figure(9.0, 3.5)
+    diagrams = figure.subplots(1, len(ramps), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, ramp in zip(diagrams, ramps, strict=True):
+        here = [run for run in cooperative if run.ramp_veh_h == ramp]
+        for strategy in dict.fromkeys(run.strategy for run in here):
+            look = look_of(strategy)
+            margins_m, shares = margin_distribution([r for r in here if r.strategy == strategy])
+            axes.step(
+                margins_m,
+                100.0 * shares,
+                where="post",
+                color=look.colour,
+                linestyle=look.line,
+                label=look.label,
+            )
+        axes.axvline(
+            allowance_m, color=BLACK, linewidth=0.9, linestyle="--", label="what the checker asks"
+        )
+        axes.set(
+            title=f"{here[0].mainline_veh_h:g} + {ramp:g} veh/h",
+            xscale="log",
+            xlabel="margin over the safe distance (m)",
+            ylim=(0.0, 101.0),
+        )
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    grid(*diagrams)
+    diagrams[0].set_ylabel("decisions with at most this margin (%)")
+    legend_below(figure, diagrams, 3)
+    return figure
+
+
+def margin_distribution(runs: Sequence[DrawnRun]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the margins (m) of all decisions that change something, ascending, and shares.
+
+    A share is that of decisions with at most that margin; vehicles that are alone have no margin
+    and count as larger than all.
+    """
+    frames = [run.decisions for run in runs if run.decisions is not None]
+    margins_m = pl.concat(frame["min_margin_m"] for frame in frames).drop_nulls().sort().to_numpy()
+    shares = np.arange(1, len(margins_m) + 1) / max(1, len(margins_m))
+    finite = np.isfinite(margins_m)
+    return margins_m[finite], shares[finite]

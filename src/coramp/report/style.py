@@ -1,0 +1,109 @@
+"""One look for all figures: colours, markers and lines a strategy, sizes, and how files come out.
+
+Colours are the Okabe-Ito palette, which colour-blind readers can tell apart; markers and lines
+differ as well, so that a print in grey can be read.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from coramp.errors import CorampError
+
+BLUE, VERMILION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
+SKY, ORANGE, BLACK, GREY, YELLOW = "#56b4e9", "#e69f00", "#000000", "#7f7f7f", "#f0e442"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, BLACK, GREY)
+MARKERS = "osD^vPX*"
+LINES = ("-", "--", "-.", ":")
+HATCHES = ("", "///", "...", "xxx", "\\\\\\")
+DPI = 110
+RC: dict[str, float | str] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.5,
+    "lines.markersize": 5.0,
+    "errorbar.capsize": 2.5,
+    "hatch.linewidth": 0.6,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "coramp",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one strategy is drawn, and what it is called."""
+
+    label: str
+    colour: str
+    marker: str
+    line: str
+
+
+UNCONTROLLED = {
+    "paper": Look("no control, paper's drivers", VERMILION, "s", "--"),
+    "fair": Look("no control, fair drivers", ORANGE, "D", "-."),
+    "paper-sigma0": Look("no control, paper's drivers, no noise", PURPLE, "v", "--"),
+    "fair-sigma0": Look("no control, fair drivers, no noise", SKY, "P", "-."),
+}
+COOPERATIVE = {
+    "mainline-priority": Look("mainline priority", BLUE, "o", "-"),
+    "ramp-priority": Look("ramp priority", GREEN, "^", ":"),
+}
+
+
+def look_of(strategy: str, drivers: str | None = None) -> Look:
+    """Returns how a strategy is drawn; one that is not known is black, with its own name."""
+    known = UNCONTROLLED.get(drivers) if drivers else COOPERATIVE.get(strategy)
+    name = f"{strategy} ({drivers})" if drivers else strategy
+    return known or Look(name, BLACK, "X", "-")
+
+
+def _use_our_settings() -> None:
+    for key, value in RC.items():
+        mpl.rcParams[key] = value  # type: ignore[index]
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Returns an empty figure of a size in inches; figures are 6 to 11 in wide."""
+    _use_our_settings()
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def grid(*many: Axes) -> None:
+    """Lays a faint grid behind each diagram."""
+    for axes in many:
+        axes.grid(alpha=0.3)
+        axes.set_axisbelow(True)
+
+
+def legend_below(figure: Figure, sources: Iterable[Axes], columns: int) -> None:
+    """Writes one legend under a figure, with each label once."""
+    found: dict[str, Artist] = {}
+    for axes in sources:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns)
+
+
+def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> Path:
+    """Writes a figure and returns its path; the ending says how (png, svg, pdf).
+
+    The same figure gives the same bytes. Raises CorampError where it cannot be written.
+    """
+    _use_our_settings()
+    undated = {"Software": None} if path.suffix == ".png" else {"Date": None}
+    if path.suffix == ".pdf":
+        undated = {"CreationDate": None}
+    try:
+        figure.savefig(path, dpi=dpi, metadata=undated)
+    except OSError as error:
+        raise CorampError(
+            f"{path}: cannot be written: {error.strerror}; give another folder"
+        ) from error
+    return path
