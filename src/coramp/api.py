@@ -1,6 +1,6 @@
-"""What notebooks and the command line call: run, study, plan."""
+"""What notebooks and the command line call: run, study, plan, figures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ import polars as pl
 from coramp.engines.sumo.engine import SumoOptions
 from coramp.errors import CorampError
 from coramp.explanation import Quantity, quantities
-from coramp.files import staged_folder
+from coramp.files import made_folder, staged_folder
 from coramp.metrics.tables import Row
 from coramp.planning import PlannedSnapshot, plan_snapshot
 from coramp.run_folder import MARK, run_content, write_run
@@ -29,6 +29,8 @@ from coramp.studies.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from coramp.report.figures import FigureSet
 
 
 MANY_RUNS = 100_000
@@ -279,6 +281,41 @@ def plan(snapshot: str, strategy: str = "mainline-priority") -> PlanResult:
     'reach'
     """
     return PlanResult(plan_snapshot(load_snapshot(snapshot), strategy))
+
+
+def figures(
+    out: str | Path = "out/figures",
+    *,
+    seeds: int = 3,
+    jobs: int | None = None,
+    studies: Iterable[str | Path] = (),
+    progress: Callable[[Progress], None] | None = None,
+) -> "FigureSet":
+    """Draws the paper's figures and ours into ``out``, as SVG and PNG, from runs of our own.
+
+    It runs the built-in studies ``paper`` and ``sensitivity`` and some single runs with seeds 1 to
+    ``seeds``: drivers in SUMO, the others in the exact engine. They are kept in ``out/study``, and
+    what is there is not run again. ``studies`` are folders of finished studies to draw in their
+    place; that of a capacity study adds its figure. Raises CorampError for what cannot be run,
+    read or written.
+    """
+    from coramp.report.drawn_runs import drawn_runs, specs_of
+    from coramp.report.figures import save_figures
+    from coramp.report.study_folder import read_study
+
+    if seeds < 1:
+        raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
+    given = [read_study(Path(folder)) for folder in studies]
+    found = {stored.layout: stored for stored in given}
+    folder = made_folder(Path(out))
+    for name in ("paper", "sensitivity"):
+        if name not in found:
+            kept = folder / "study" / name
+            study(name, seeds=seeds, jobs=jobs, engine="exact", out=kept, progress=progress)
+            found[name] = read_study(kept)
+    specs = specs_of(seeds, found["paper"].horizon_s)
+    runs = drawn_runs(folder / "study" / "runs", specs, progress or (lambda _: None))
+    return save_figures(folder, found, runs)
 
 
 def as_pandas(frame: pl.DataFrame) -> "pd.DataFrame":

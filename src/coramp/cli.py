@@ -229,6 +229,36 @@ def explain(
         print_story(story)
 
 
+@app.command(epilog="Example: coramp figures --seeds 10 --study out/capacity --out out/figures")
+def figures(
+    out: Annotated[
+        Path, typer.Option(help="Folder for the figures; runs are kept in its study/.")
+    ] = Path("out/figures"),
+    seeds: Annotated[int, typer.Option(help="Seeds 1 to N of what is run for them.")] = 3,
+    jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
+    studies: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--study",
+            metavar="FOLDER",
+            help="Draw this finished study too (capacity), or in place of a run of "
+            "its own (paper, sensitivity).",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw the paper's figures and ours, as SVG and PNG; run what they need."""
+    from coramp.api import figures as draw_figures
+    from coramp.console import StudyProgress, figures_json, print_figures, print_json
+
+    with StudyProgress() as progress:
+        result = draw_figures(out, seeds=seeds, jobs=jobs, studies=studies or (), progress=progress)
+    if json:
+        print_json(figures_json(result))
+    else:
+        print_figures(result)
+
+
 def _exit_if_broken(broken: list[str]) -> None:
     if broken:
         for line in broken:

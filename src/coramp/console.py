@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich import box
 from rich.console import Console
@@ -23,6 +23,9 @@ from coramp.story import Story, told
 from coramp.studies.outlook import Outlook
 from coramp.studies.runner import Progress as StudyState
 from coramp.studies.tables import Table, number
+
+if TYPE_CHECKING:
+    from coramp.report.figures import FigureSet
 
 WIDE = 240
 """Columns of tables that do not go to a terminal."""
@@ -288,6 +291,26 @@ def study_json(result: StudyResult) -> Row:
             {"title": t.title, "columns": t.columns, "rows": t.rows, "notes": t.notes}
             for t in result.tables
         ],
+    }
+
+
+def print_figures(drawn: "FigureSet") -> None:
+    """Prints which figures were drawn, where they lie, and what was left out."""
+    for name, files in drawn.files.items():
+        print(f"{name}: {', '.join(file.suffix.lstrip('.') for file in files)}")
+    print(f"{counted(len(drawn.files), 'figure')} in {drawn.folder}.")
+    for note in drawn.notes:
+        print(f"Note: {note}.")
+
+
+def figures_json(drawn: "FigureSet") -> Row:
+    """Returns which figures were drawn as plain data."""
+    files = {name: [str(file) for file in files] for name, files in drawn.files.items()}
+    return {
+        "kind": "figures",
+        "folder": str(drawn.folder),
+        "files": files,
+        "notes": list(drawn.notes),
     }
 
 

@@ -46,7 +46,8 @@ def _draw(axes: Axes, look: Look, line: list[Breakdown], label: str, number: int
         yerr=[b.estimate.half_width if len(b.flows) > 1 else 0.0 for b in line],
         color=look.colour,
         marker=look.marker,
-        linestyle=LINES[number % len(LINES)],
+        linestyle=look.line if line[0].drivers else LINES[number % len(LINES)],
+        linewidth=look.width_pt,
         markerfacecolor="white" if number % 2 else look.colour,
         label=label,
     )

@@ -30,11 +30,11 @@ CAPACITY_LEFT_OUT = (
 
 @dataclass(frozen=True)
 class FigureSet:
-    """The figures that were drawn: each name with its files, and what was left out and why."""
+    """The figures that were drawn: each name with its files, and what is to be said of them."""
 
     folder: Path
     files: Mapping[str, tuple[Path, ...]]
-    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def save_figures(
@@ -50,7 +50,14 @@ def save_figures(
     for name, draw in _catalogue(studies, runs):
         figure = draw()
         files[name] = tuple(save_figure(figure, folder / f"{name}.{end}") for end in FORMATS)
-    return FigureSet(folder, files, () if "capacity" in studies else (CAPACITY_LEFT_OUT,))
+    notes = [
+        f"{stored.failed} runs of {stored.folder} failed and are not drawn"
+        for stored in studies.values()
+        if stored.failed
+    ]
+    if "capacity" not in studies:
+        notes.append(CAPACITY_LEFT_OUT)
+    return FigureSet(folder, files, tuple(notes))
 
 
 def _catalogue(

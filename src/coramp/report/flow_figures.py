@@ -62,6 +62,7 @@ def delay_figure(runs: pl.DataFrame) -> Figure:
                 color=look.colour,
                 marker=look.marker,
                 linestyle=look.line,
+                linewidth=look.width_pt,
                 label=look.label,
             )
         axes.set_yscale("symlog", linthresh=LINEAR_TO_S, linscale=0.6)

@@ -52,9 +52,8 @@ def road_figure(scenario: Scenario) -> Figure:
     figure = new_figure(8.6, 5.2)
     whole, near = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
     for axes in (whole, near):
-        for lane, shape_m in shapes_m.items():
-            label, colour = LANES[lane]
-            xs_m, ys_m = zip(*shape_m, strict=True)
+        for lane, (label, colour) in LANES.items():
+            xs_m, ys_m = zip(*shapes_m[lane], strict=True)
             axes.plot(xs_m, ys_m, color=colour, linewidth=3.0, label=label, gid=lane)
         grid(axes)
     near.axvline(0.0, color=BLACK, linewidth=0.8, linestyle=":")

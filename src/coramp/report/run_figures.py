@@ -8,6 +8,7 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coramp.metrics.motion import BIN_S
 from coramp.report.style import BLACK, grid, legend_below, look_of, new_figure
 
 SMOOTH_S = 60
@@ -55,17 +56,21 @@ def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
 
 def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
     look = look_of(run.strategy, run.drivers)
-    own = run.speeds.filter(pl.col("stream") == stream, pl.col("time_s") < run.horizon_s)
-    times_s, speeds_mps = own["time_s"].to_numpy(), own["mean_speed_mps"].to_numpy()
-    axes.plot(times_s, speeds_mps, color=look.colour, alpha=0.25, linewidth=0.6)
-    smooth_mps = own["mean_speed_mps"].rolling_mean(SMOOTH_S, min_samples=1, center=True)
+    own = run.speeds.filter(stream=stream).select("time_s", "mean_speed_mps")
+    every = pl.DataFrame({"time_s": np.arange(0.0, run.horizon_s, BIN_S)})
+    speeds_mps = every.join(own, on="time_s", how="left", maintain_order="left")["mean_speed_mps"]
+    times_s = every["time_s"].to_numpy()
+    axes.plot(times_s, speeds_mps.to_numpy(), color=look.colour, alpha=0.3, linewidth=0.6)
+    smooth_mps = speeds_mps.rolling_mean(SMOOTH_S, min_samples=1, center=True).to_numpy()
+    apart = max(1, len(times_s) // 10)
     axes.plot(
         times_s,
         smooth_mps,
         color=look.colour,
         linestyle=look.line,
+        linewidth=look.width_pt,
         marker=look.marker,
-        markevery=max(1, len(times_s) // 12),
+        markevery=(apart // 2 if look.line == ":" else 0, apart),
         label=look.label,
     )
 
@@ -92,6 +97,7 @@ def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
                 where="post",
                 color=look.colour,
                 linestyle=look.line,
+                linewidth=look.width_pt,
                 label=look.label,
             )
         axes.axvline(

@@ -32,18 +32,20 @@ def sensitivity_figure(runs: pl.DataFrame) -> Figure:
     """
     settings = settings_of(runs)
     figure = new_figure(max(4.0, 2.6 * len(settings) + 0.6), 5.6)
-    diagrams = figure.subplots(2, len(settings), sharey=True, squeeze=False)
+    diagrams = figure.subplots(2, len(settings), sharex="col", sharey=True, squeeze=False)
     flows = sorted(runs.select("mainline_veh_h", "ramp_veh_h").unique().iter_rows())
     for row, stream in zip(diagrams, STREAMS, strict=True):
-        for axes, (key, values) in zip(row, settings.items(), strict=True):
+        for axes, values in zip(row, settings.values(), strict=True):
             for k, pair in enumerate(flows):
                 _draw_line(axes, runs, values, (f"{stream}_delay_s", pair), k)
             axes.axhline(BREAKDOWN_DELAY_S, color=BLACK, linestyle=(0, (6, 4)), linewidth=0.8)
             axes.set_yscale("symlog", linthresh=0.1, linscale=0.5)
             axes.set_xticks(range(len(values)), [f"{value:g}" for value, _ in values], fontsize=8)
-            axes.set_xlabel(KEYS.get(key, key))
+            axes.set_ylim(0.0, None)
             grid(axes)
         row[0].set_ylabel(f"mean {stream} delay (s)")
+    for axes, key in zip(diagrams[-1], settings, strict=True):
+        axes.set_xlabel(KEYS.get(key, key))
     diagrams[0, 0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     legend_below(figure, diagrams.flat, 5)
     return figure
@@ -64,7 +66,8 @@ def settings_of(runs: pl.DataFrame) -> dict[str, Settings]:
         scenario = load_scenario(plain["scenario"][0]).model_dump()
         for key, values in found.items():
             values.append((_looked_up(scenario, key), None))
-    return {key: sorted(values, key=lambda v: v[0]) for key, values in found.items()}
+    order = sorted(found, key=lambda key: list(KEYS).index(key) if key in KEYS else len(KEYS))
+    return {key: sorted(found[key], key=lambda v: v[0]) for key in order}
 
 
 def _looked_up(data: Any, dotted: str) -> float:

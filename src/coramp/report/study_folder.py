@@ -9,15 +9,19 @@ from coramp.errors import CorampError
 from coramp.files import read_json
 from coramp.studies.store import MARK
 
+DRAWN = ("paper", "sensitivity", "capacity")
+"""The layouts of studies that there are figures of."""
+
 
 @dataclass(frozen=True)
 class StoredStudy:
-    """The runs of a finished study that went well, and what the study asked for."""
+    """The runs of a finished study that went well, how many failed, and what was asked for."""
 
     folder: Path
     layout: str
     horizon_s: float | None
     runs: pl.DataFrame
+    failed: int
 
 
 def read_study(folder: Path) -> StoredStudy:
@@ -34,11 +38,17 @@ def read_study(folder: Path) -> StoredStudy:
     if not path.exists():
         raise CorampError(f"{folder}: is not finished; start its coramp study again")
     try:
-        runs = pl.read_parquet(path).filter(pl.col("status") == "ok")
-        asked = content["study"]
-        found = StoredStudy(folder, asked["layout"], asked["horizon_s"], runs)
+        every = pl.read_parquet(path)
+        runs = every.filter(pl.col("status") == "ok")
+        asked, failed = content["study"], every.height - runs.height
+        found = StoredStudy(folder, asked["layout"], asked["horizon_s"], runs, failed)
     except (OSError, KeyError, TypeError, pl.exceptions.PolarsError) as error:
         raise CorampError(f"{folder}: cannot be read: {error}; run the study again") from error
+    if found.layout not in DRAWN:
+        raise CorampError(
+            f"{folder}: there is no figure of studies with the layout {found.layout}; "
+            f"allowed are {', '.join(DRAWN)}"
+        )
     if runs.is_empty():
         raise CorampError(f"{folder}: no run went well; start its coramp study again")
     return found

@@ -20,7 +20,7 @@ SKY, ORANGE, BLACK, GREY, YELLOW = "#56b4e9", "#e69f00", "#000000", "#7f7f7f", "
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, BLACK, GREY)
 MARKERS = "osD^vPX*"
 LINES = ("-", "--", "-.", ":")
-HATCHES = ("", "///", "...", "xxx", "\\\\\\")
+HATCHES = ("", "///", "...", "\\\\\\", "xx")
 DPI = 110
 RC: dict[str, float | str] = {
     "font.size": 9.0,
@@ -37,23 +37,27 @@ RC: dict[str, float | str] = {
 
 @dataclass(frozen=True)
 class Look:
-    """How one strategy is drawn, and what it is called."""
+    """How one strategy is drawn, and what it is called.
+
+    Mainline priority is wide, so that it can be seen where another line lies on it.
+    """
 
     label: str
     colour: str
     marker: str
     line: str
+    width_pt: float = 1.5
 
 
 UNCONTROLLED = {
     "paper": Look("no control, paper's drivers", VERMILION, "s", "--"),
     "fair": Look("no control, fair drivers", ORANGE, "D", "-."),
-    "paper-sigma0": Look("no control, paper's drivers, no noise", PURPLE, "v", "--"),
+    "paper-sigma0": Look("no control, paper's drivers, no noise", GREEN, "v", "--"),
     "fair-sigma0": Look("no control, fair drivers, no noise", SKY, "P", "-."),
 }
 COOPERATIVE = {
-    "mainline-priority": Look("mainline priority", BLUE, "o", "-"),
-    "ramp-priority": Look("ramp priority", GREEN, "^", ":"),
+    "mainline-priority": Look("mainline priority", BLUE, "o", "-", 2.8),
+    "ramp-priority": Look("ramp priority", PURPLE, "^", ":"),
 }
 
 
