@@ -247,11 +247,10 @@ def outlook(
     """Returns how much of a study is done and how long the rest should take; runs nothing."""
     definition, seeds = _defined(name, seeds, engine, many)
     specs = expand(definition, seeds, name)
-    bisections(definition, seeds, name)
-    at_most = count_runs(definition, seeds)
+    searches = bisections(definition, seeds, name)
     folder = _folder_of(definition, out)
     store = Store(folder, definition) if (folder / STUDY_MARK).exists() else None
-    return outlook_of(store, folder, specs, at_most, jobs or usable_cores())
+    return outlook_of(store, folder, specs, searches, jobs or usable_cores())
 
 
 def _defined(name: str, seeds: int | None, engine: str | None, many: bool) -> tuple[Study, int]:

@@ -64,3 +64,34 @@ def test_another_engine_moves_only_cooperative_runs(tmp_path):
         coramp.study(definition, engine="exact", out=tmp_path / "sumo")
     with pytest.raises(coramp.CorampError, match="there is no 'exactly'"):
         coramp.study(definition, engine="exactly", out=tmp_path / "o")
+
+
+SEARCH = """
+name = "searched"
+scenario = "paper"
+seeds = 2
+horizon_s = 30.0
+
+[[searches]]
+strategies = ["mainline-priority"]
+engine = "exact"
+mainline_from_veh_h = 1200.0
+mainline_to_veh_h = 1600.0
+resolution_veh_h = 100.0
+ramp_veh_h = [200.0]
+"""
+
+
+def test_searches_count_at_most_before_and_as_they_were_after(tmp_path):
+    definition, folder = written(tmp_path, SEARCH), tmp_path / "o"
+    before = outlook(definition, jobs=1, out=folder)
+    # both ends, then the middle of 4 steps and of 2
+    assert (before.runs, before.missing, before.searches_at_most) == (0, 0, 2 * 4)
+    assert before.expected_s > 0.0
+    result = coramp.study(definition, jobs=1, out=folder)
+    after = outlook(definition, jobs=1, out=folder)
+    # nothing breaks down in half a minute: both ends are enough
+    assert result.runs.height == 2 * 2
+    assert (after.runs, after.done, after.searches_at_most, after.expected_s) == (4, 4, 0, 0.0)
+    more = outlook(definition, seeds=3, jobs=1, out=folder)
+    assert (more.runs, more.done, more.searches_at_most) == (4, 4, 4)

@@ -45,6 +45,21 @@ class Bisection:
             low, high = (low, middle) if broken else (middle, high)
         return None
 
+    def so_far(
+        self, result_of: Callable[[RunSpec], Mapping[str, Any] | None]
+    ) -> tuple[list[RunSpec], int]:
+        """Returns the runs that the search rests on so far, and how many more it takes at most."""
+        taken: dict[str, RunSpec] = {}
+
+        def noted(spec: RunSpec) -> Mapping[str, Any] | None:
+            result = result_of(spec)
+            if result is not None:
+                taken[spec.run_id] = spec
+            return result
+
+        ended = self.next_run(noted) is None
+        return list(taken.values()), 0 if ended else self.search.runs_at_most - len(taken)
+
     def spec_at(self, step: int) -> RunSpec:
         """Returns the run at one of the search's flows."""
         scenario = self.first.scenario

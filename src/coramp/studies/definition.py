@@ -86,6 +86,11 @@ class Search(Model):
             (self.mainline_to_veh_h - self.mainline_from_veh_h) / self.resolution_veh_h
         )
 
+    @property
+    def runs_at_most(self) -> int:
+        """How many runs a search takes at most: both ends, then halves."""
+        return 2 + max(0, self.steps - 1).bit_length()
+
     def flow_veh_h(self, step: int) -> float:
         """Returns the mainline flow of a step; the last is the upper end."""
         flow = self.mainline_from_veh_h + step * self.resolution_veh_h
@@ -200,9 +205,7 @@ def count_runs(study: Study, seeds: int) -> int:
     """Returns how many runs a study has at most."""
     grids = sum(len(grid.flows) * sum(1 for _ in variants(grid)) for grid in study.runs)
     searches = sum(
-        len(search.ramp_veh_h)
-        * sum(1 for _ in variants(search))
-        * (2 + max(0, search.steps - 1).bit_length())
+        len(search.ramp_veh_h) * sum(1 for _ in variants(search)) * search.runs_at_most
         for search in study.searches
     )
     return (grids + searches) * seeds

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from coramp.metrics.tables import Row
 from coramp.running import RunSpec
+from coramp.studies.breakdown import Bisection
 from coramp.studies.store import Store
 
 SECONDS_PER_VEHICLE = {("exact", False): 5e-5, ("sumo", False): 8e-4, ("sumo", True): 2e-3}
@@ -38,25 +40,40 @@ class Outlook:
 
 
 def outlook_of(
-    store: Store | None, folder: Path, specs: Sequence[RunSpec], at_most: int, jobs: int
+    store: Store | None,
+    folder: Path,
+    specs: Sequence[RunSpec],
+    searches: Sequence[Bisection],
+    jobs: int,
 ) -> Outlook:
-    """Returns the outlook of a study; ``store`` is None where nothing was begun."""
+    """Returns the outlook of a study; ``store`` is None where nothing was begun.
+
+    What a search may still take is reckoned at the middle of its range.
+    """
+
+    def result_of(spec: RunSpec) -> Row | None:
+        part = store.read(spec) if store is not None else None
+        return part.run if part is not None else None
+
     seen: dict[tuple[str, bool], list[float]] = defaultdict(list)
-    done = failed = damaged = 0
-    missing = []
-    for spec in specs:
-        part = store.stored(spec) if store is not None else None
-        if part is not None and part.run["status"] == "ok":
-            done += 1
-            seen[_kind(spec)].append(part.run["wall_s"] / max(1.0, _vehicles(spec)))
+    missing, likely, done = [], [], 0
+    walks = [search.so_far(result_of) for search in searches]
+    for spec in {s.run_id: s for s in (*specs, *(s for taken, _ in walks for s in taken))}.values():
+        run = result_of(spec)
+        if run is None:
+            missing.append(spec)
             continue
-        failed += part is not None
-        damaged += store is not None and store.is_damaged(spec)
-        missing.append(spec)
+        done += 1
+        seen[_kind(spec)].append(run["wall_s"] / max(1.0, _vehicles(spec)))
+    for search, (_, left) in zip(searches, walks, strict=True):
+        likely += [search.spec_at(search.search.steps // 2)] * left
     per_vehicle_s = {**SECONDS_PER_VEHICLE, **{kind: median(s) for kind, s in seen.items()}}
-    expected_s = sum(per_vehicle_s[_kind(spec)] * _vehicles(spec) for spec in missing) / jobs
-    searches = at_most - len(specs)
-    return Outlook(folder, len(specs), done, failed, damaged, searches, jobs, expected_s)
+    expected_s = sum(per_vehicle_s[_kind(s)] * _vehicles(s) for s in (*missing, *likely)) / jobs
+    damaged = sum(store.is_damaged(spec) for spec in missing) if store is not None else 0
+    failed = sum(store.stored(spec) is not None for spec in missing) if store is not None else 0
+    return Outlook(
+        folder, done + len(missing), done, failed, damaged, len(likely), jobs, expected_s
+    )
 
 
 def _kind(spec: RunSpec) -> tuple[str, bool]:
