@@ -118,7 +118,7 @@ def test_the_figure_has_a_line_for_each_combination():
     runs = runs_of(*rows(1, 1500.0), *rows(1, 9999.0, ramp=800.0))
     figure = capacity_figure(runs)
     (axes,) = figure.axes
-    (line,) = [c for c in axes.containers if c.get_label() == "mainline-priority, Eq. 1"]
+    (line,) = [c for c in axes.containers if c.get_label() == "mainline priority, Eq. 1"]
     assert line[0].get_xydata().tolist() == [[500.0, 1500.0], [800.0, 2000.0]]
 
 

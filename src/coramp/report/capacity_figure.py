@@ -33,7 +33,8 @@ def capacity_figure(runs: pl.DataFrame) -> Figure:
         _draw(axes, look, line, f"{look.label}{label}", number)
     axes.set(xlabel="ramp flow (veh/h)", ylabel="mainline flow at breakdown (veh/h)")
     grid(axes)
-    figure.legend(loc="outside right upper")
+    if found:
+        figure.legend(loc="outside right upper")
     return figure
 
 
@@ -48,6 +49,7 @@ def _draw(axes: Axes, look: Look, line: list[Breakdown], label: str, number: int
         marker=look.marker,
         linestyle=look.line if line[0].drivers else LINES[number % len(LINES)],
         linewidth=look.width_pt,
+        elinewidth=1.2,
         markerfacecolor="white" if number % 2 else look.colour,
         label=label,
     )

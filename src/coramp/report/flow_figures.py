@@ -63,6 +63,7 @@ def delay_figure(runs: pl.DataFrame) -> Figure:
                 marker=look.marker,
                 linestyle=look.line,
                 linewidth=look.width_pt,
+                elinewidth=1.2,
                 label=look.label,
             )
         axes.set_yscale("symlog", linthresh=LINEAR_TO_S, linscale=0.6)

@@ -41,11 +41,11 @@ def sensitivity_figure(runs: pl.DataFrame) -> Figure:
             axes.axhline(BREAKDOWN_DELAY_S, color=BLACK, linestyle=(0, (6, 4)), linewidth=0.8)
             axes.set_yscale("symlog", linthresh=0.1, linscale=0.5)
             axes.set_xticks(range(len(values)), [f"{value:g}" for value, _ in values], fontsize=8)
-            axes.set_ylim(0.0, None)
             grid(axes)
         row[0].set_ylabel(f"mean {stream} delay (s)")
     for axes, key in zip(diagrams[-1], settings, strict=True):
         axes.set_xlabel(KEYS.get(key, key))
+    diagrams[0, 0].set_ylim(bottom=0.0)
     diagrams[0, 0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     legend_below(figure, diagrams.flat, 5)
     return figure

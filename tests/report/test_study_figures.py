@@ -1,0 +1,201 @@
+"""Figures of studies, from rows made by hand."""
+
+import polars as pl
+import pytest
+
+from coramp.report.capacity_figure import capacity_figure
+from coramp.report.flow_figures import delay_figure, flows_of, gain_figure, rung_figure
+from coramp.report.sensitivity_figure import sensitivity_figure, settings_of
+from coramp.report.style import look_of
+from tests.study import run_row, runs_of
+
+FLOWS = [(800.0, 200.0), (1800.0, 500.0)]
+T_2 = 4.302652729911275
+"""Student's t for 95 % and three seeds."""
+
+
+def delays(strategy, flows, mainline, ramp, drivers=None, **rest):
+    return run_row(
+        strategy, *flows, drivers=drivers, mainline_delay_s=mainline, ramp_delay_s=ramp, **rest
+    )
+
+
+@pytest.fixture(scope="module")
+def runs():
+    rows = []
+    for seed, more in ((1, -0.1), (2, 0.0), (3, 0.1)):
+        for flows in FLOWS:
+            rows += [
+                delays(
+                    "mainline-priority",
+                    flows,
+                    0.5 + more,
+                    0.2,
+                    seed=seed,
+                    rung_free=6,
+                    rung_reach=3,
+                    rung_delay=1,
+                    rung_hold=2,
+                ),
+                delays("ramp-priority", flows, 1.0, 0.1, seed=seed, rung_free=4, rung_create=4),
+                delays("uncontrolled", flows, 10.0, 8.0, drivers="paper", seed=seed),
+                delays("uncontrolled", flows, 2.0, 0.05, drivers="fair", seed=seed),
+            ]
+    rows.append(delays("uncontrolled", (800.0, 0.0), 1.0, None, drivers="fair"))
+    return runs_of(*rows)
+
+
+def errorbars(axes):
+    """Returns each labelled line's heights and the ends of its error bars."""
+    found = {}
+    for container in axes.containers:
+        line, _, (bars,) = container.lines
+        ends = [tuple(segment[:, 1]) for segment in bars.get_segments()]
+        found[container.get_label()] = (list(line.get_ydata()), ends)
+    return found
+
+
+def test_flows_are_those_of_cooperative_runs(runs):
+    assert flows_of(runs) == [(800, 200), (1800, 500)]
+
+
+def test_delays_are_means_with_intervals_for_each_strategy_and_population(runs):
+    mainline, ramp = delay_figure(runs).axes
+    drawn = errorbars(mainline)
+    assert list(drawn) == [
+        "mainline priority",
+        "ramp priority",
+        "no control, paper's drivers",
+        "no control, fair drivers",
+    ]
+    heights, ends = drawn["mainline priority"]
+    half_s = T_2 * 0.1 / 3**0.5
+    assert heights == pytest.approx([0.5, 0.5])
+    assert ends[0] == pytest.approx((0.5 - half_s, 0.5 + half_s))
+    assert drawn["no control, paper's drivers"][0] == [10.0, 10.0]
+    assert errorbars(ramp)["ramp priority"][0] == pytest.approx([0.1, 0.1])
+    assert mainline.get_ylabel() == "mean delay (s)"
+    assert [t.get_text() for t in ramp.get_xticklabels()] == ["800 + 200", "1800 + 500"]
+
+
+def test_strategies_differ_by_more_than_colour():
+    looks = [
+        look_of("mainline-priority"),
+        look_of("ramp-priority"),
+        look_of("uncontrolled", "paper"),
+        look_of("uncontrolled", "fair"),
+    ]
+    for part in ("colour", "marker", "line", "label"):
+        assert len({getattr(look, part) for look in looks}) == 4
+    assert look_of("mine").label == "mine"
+    assert look_of("uncontrolled", "sleepy").label == "uncontrolled (sleepy)"
+
+
+def test_gains_stand_beside_each_other_and_beside_the_papers(runs):
+    axes = gain_figure(runs).axes
+    by_title = {a.get_title(): a for a in axes}
+    mainline = by_title["mainline priority, mainline"]
+    against_paper, against_fair = ([bar.get_height() for bar in c] for c in mainline.containers)
+    assert against_paper == pytest.approx([95.0, 95.0])  # 1 - 0.5 / 10
+    assert against_fair == pytest.approx([75.0, 75.0])  # 1 - 0.5 / 2
+    (printed,) = mainline.get_lines()
+    assert printed.get_ydata() == pytest.approx(
+        [100.0 * (1.0 - 0.23 / 4.44), 100.0 * (1.0 - 0.68 / 26.98)]
+    )
+    (printed,) = by_title["ramp priority, ramp"].get_lines()
+    assert printed.get_ydata() == pytest.approx(
+        [100.0 * (1.0 - 0.46 / 7.35), 100.0 * (1.0 - 0.85 / 20.42)]
+    )
+    assert axes[0].get_ylabel() == "delay saved (%)"
+
+
+def test_there_is_no_gain_over_a_baseline_that_loses_nothing(runs):
+    ramp = next(a for a in gain_figure(runs).axes if a.get_title() == "mainline priority, ramp")
+    against_paper, against_fair = ([bar.get_height() for bar in c] for c in ramp.containers)
+    assert against_paper == pytest.approx([97.5, 97.5])
+    assert against_fair == [0.0, 0.0]  # 0.05 s is below the least baseline
+
+
+def test_rungs_are_shares_of_all_merges_on_top_of_each_other(runs):
+    mainline, ramp = rung_figure(runs).axes
+    bars = {c.get_label(): [(b.get_y(), b.get_height()) for b in c] for c in mainline.containers}
+    assert bars["free"][0] == pytest.approx((0.0, 60.0))
+    assert bars["reach"][0] == pytest.approx((60.0, 30.0))
+    assert bars["create"][0] == pytest.approx((90.0, 0.0))
+    assert bars["delay"][0] == pytest.approx((90.0, 10.0))
+    (held,) = mainline.get_lines()
+    assert held.get_ydata() == pytest.approx([20.0, 20.0])
+    heights = {c.get_label(): c[1].get_height() for c in ramp.containers}
+    assert heights == pytest.approx({"free": 50.0, "reach": 0.0, "create": 50.0, "delay": 0.0})
+    assert mainline.get_ylabel() == "share of ramp vehicles (%)"
+
+
+def setting(text, mainline, ramp=0.3, seed=1):
+    row = delays("mainline-priority", (1800.0, 500.0), mainline, ramp, seed=seed)
+    return {**row, "overrides": text, "run_id": f"{text}{seed}"}
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return runs_of(
+        setting(None, 0.1),
+        setting("safety.time_gap_s=1.0", 40.0),
+        setting("safety.time_gap_s=0.6", 3.0, seed=1),
+        setting("safety.time_gap_s=0.6", 5.0, seed=2),
+        setting("safety.positioning_error_m=0.5", 0.2),
+    )
+
+
+def test_settings_stand_in_order_with_the_scenarios_own_value(settings):
+    assert settings_of(settings) == {
+        "safety.positioning_error_m": [(0.02, None), (0.5, "safety.positioning_error_m=0.5")],
+        "safety.time_gap_s": [
+            (0.0, None),
+            (0.6, "safety.time_gap_s=0.6"),
+            (1.0, "safety.time_gap_s=1.0"),
+        ],
+    }
+
+
+def test_sensitivity_has_a_column_a_setting_and_shows_everything(settings):
+    axes = sensitivity_figure(settings).axes
+    assert [a.get_xlabel() for a in axes] == ["", "", "positioning error L₁ (m)", "time gap (s)"]
+    assert [a.get_ylabel() for a in axes[::2]] == ["mean mainline delay (s)", "mean ramp delay (s)"]
+    heights, _ = errorbars(axes[1])["1800 + 500 veh/h"]
+    assert heights == pytest.approx([0.1, 4.0, 40.0])
+    low, high = axes[1].get_ylim()
+    assert low == 0.0
+    assert high > 40.0
+    limits = [line.get_ydata()[0] for line in axes[1].get_lines() if len(line.get_xdata()) == 2]
+    assert 5.0 in limits
+
+
+def test_capacity_has_a_line_a_combination_in_the_strategys_colour():
+    rows = []
+    for text in (None, "safety.time_gap_s=1.0"):
+        for flow, delay in ((1200.0, 0.1), (1400.0, 9.0 if text else 0.1), (1600.0, 9.0)):
+            row = delays("mainline-priority", (flow, 500.0), delay, 0.1)
+            rows.append({**row, "overrides": text})
+    rows += [
+        delays("uncontrolled", (flow, 500.0), delay, 0.1, drivers="fair")
+        for flow, delay in ((1200.0, 0.1), (1600.0, 9.0))
+    ]
+    (axes,) = capacity_figure(runs_of(*rows)).axes
+    drawn = {label: heights for label, (heights, _) in errorbars(axes).items()}
+    assert drawn == {
+        "mainline priority, Eq. 1": [1600.0],
+        "mainline priority, 1.0 s": [1400.0],
+        "no control, fair drivers": [1600.0],
+    }
+    colours = {c.get_label(): c.lines[0].get_color() for c in axes.containers}
+    assert colours["mainline priority, Eq. 1"] == colours["mainline priority, 1.0 s"]
+    assert colours["mainline priority, Eq. 1"] != colours["no control, fair drivers"]
+    lines = [c.lines[0].get_linestyle() for c in axes.containers[:2]]
+    assert lines[0] != lines[1]
+    assert axes.get_xlabel() == "ramp flow (veh/h)"
+    assert axes.get_ylabel() == "mainline flow at breakdown (veh/h)"
+
+
+def test_failed_runs_are_not_drawn_in_capacity(runs):
+    failed = runs.head(1).with_columns(status=pl.lit("failed"))
+    assert capacity_figure(failed).axes[0].containers == []
