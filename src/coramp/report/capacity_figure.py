@@ -34,7 +34,7 @@ def capacity_figure(runs: pl.DataFrame) -> Figure:
     axes.set(xlabel="ramp flow (veh/h)", ylabel="mainline flow at breakdown (veh/h)")
     grid(axes)
     if found:
-        figure.legend(loc="outside right upper")
+        figure.legend(loc="outside right upper", handlelength=4.0)
     return figure
 
 

@@ -92,7 +92,8 @@ def legend_below(figure: Figure, sources: Iterable[Axes], columns: int) -> None:
     for axes in sources:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
-    figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns)
+    handles, labels = list(found.values()), list(found)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=3.0)
 
 
 def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> Path:
