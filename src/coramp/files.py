@@ -21,6 +21,12 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Writes a file of bytes in the same way."""
+    with _replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
 def write_json(path: Path, data: Any) -> None:
     """Writes JSON; numbers that it has no word for must have been taken out."""
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
@@ -30,8 +36,7 @@ def write_parquet(path: Path, frame: pl.DataFrame) -> None:
     """Writes a table."""
     content = io.BytesIO()
     frame.write_parquet(content)
-    with _replacing(path) as temporary:
-        temporary.write_bytes(content.getvalue())
+    write_bytes(path, content.getvalue())
 
 
 @contextmanager

@@ -1,14 +1,17 @@
 """`coramp figures`: every file is written, nothing is run twice, what is wrong is one line."""
 
+import dataclasses
 import json
+import shutil
 import xml.etree.ElementTree as ET
 
 import pytest
 
 import coramp
+import coramp.api
 import coramp.report.drawn_runs
 from coramp import CorampError
-from coramp.report.figures import CAPACITY_LEFT_OUT
+from coramp.report.figures import CAPACITY_LEFT_OUT, save_figures
 from coramp.report.study_folder import read_study
 from tests.edges import assert_refused, everything_below, invoke
 
@@ -165,3 +168,39 @@ def test_help_has_an_example():
     told = invoke("figures", "--help")
     assert (told.code, told.err) == (0, "")
     assert "Example: coramp figures --seeds 10 --study out/capacity" in told.out
+
+
+def test_what_is_not_given_is_run_in_the_exact_engine_below_the_figures(
+    studies, tmp_path, monkeypatch
+):
+    asked = []
+
+    def study(name, *, seeds, jobs, engine, out, progress):
+        asked.append((name, seeds, jobs, engine, out))
+        shutil.copytree(studies[name], out)
+
+    monkeypatch.setattr(coramp.api, "study", study)
+    drawn = coramp.api.figures(tmp_path / "out", seeds=2, jobs=1)
+    kept = tmp_path / "out" / "study"
+    assert asked == [(name, 2, 1, "exact", kept / name) for name in ("paper", "sensitivity")]
+    assert list(drawn.files) == NAMES
+    runs = [json.loads(path.read_text()) for path in kept.glob("runs/*/run.json")]
+    seeds = {(run["strategy"], run["seed"]) for run in runs}
+    assert seeds == {
+        ("uncontrolled", 1),
+        *((name, seed) for name in ("mainline-priority", "ramp-priority") for seed in (1, 2)),
+    }
+
+
+def test_runs_that_failed_are_told(studies, tmp_path, monkeypatch):
+    monkeypatch.setattr(coramp.report.figures, "_catalogue", lambda *_: iter(()))
+    stored = {name: read_study(studies[name]) for name in ("paper", "sensitivity")}
+    stored["paper"] = dataclasses.replace(stored["paper"], failed=3)
+    drawn = save_figures(tmp_path, stored, [])
+    assert drawn.notes == (
+        f"3 runs of {studies['paper']} failed and are not drawn",
+        CAPACITY_LEFT_OUT,
+    )
+    assert save_figures(tmp_path, {**stored, "capacity": stored["sensitivity"]}, []).notes == (
+        drawn.notes[0],
+    )

@@ -43,8 +43,7 @@ def save_plan_figure(planned: PlannedSnapshot, path: Path) -> None:
     try:
         save_figure(plan_figure(planned), path, dpi=150)
     except CorampError as error:
-        reason = str(error.messages[0]).rsplit("; ", 1)[0]
-        raise CorampError(f"--plot: {reason}; {allowed}") from error
+        raise CorampError(f"--plot: {error}; {allowed}") from error
 
 
 def plan_figure(planned: PlannedSnapshot) -> Figure:

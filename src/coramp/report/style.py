@@ -4,6 +4,7 @@ Colours are the Okabe-Ito palette, which colour-blind readers can tell apart; ma
 differ as well, so that a print in grey can be read.
 """
 
+import io
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coramp.errors import CorampError
+from coramp.files import write_bytes
 
 BLUE, VERMILION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 SKY, ORANGE, BLACK, GREY, YELLOW = "#56b4e9", "#e69f00", "#000000", "#7f7f7f", "#f0e442"
@@ -22,6 +23,8 @@ MARKERS = "osD^vPX*"
 LINES = ("-", "--", "-.", ":")
 HATCHES = ("", "///", "...", "\\\\\\", "xx")
 DPI = 110
+UNDATED = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""What each kind of file must not say, so that the same figure gives the same bytes."""
 RC: dict[str, float | str] = {
     "font.size": 9.0,
     "axes.titlesize": 9.5,
@@ -102,13 +105,7 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> Path:
     The same figure gives the same bytes. Raises CorampError where it cannot be written.
     """
     _use_our_settings()
-    undated = {"Software": None} if path.suffix == ".png" else {"Date": None}
-    if path.suffix == ".pdf":
-        undated = {"CreationDate": None}
-    try:
-        figure.savefig(path, dpi=dpi, metadata=undated)
-    except OSError as error:
-        raise CorampError(
-            f"{path}: cannot be written: {error.strerror}; give another folder"
-        ) from error
+    content, kind = io.BytesIO(), path.suffix.lower().lstrip(".")
+    figure.savefig(content, format=kind, dpi=dpi, metadata=UNDATED[kind])
+    write_bytes(path, content.getvalue())
     return path
