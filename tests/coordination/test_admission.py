@@ -34,4 +34,5 @@ def test_who_is_on_the_mainline_is_not_in_the_way_on_the_ramp(merge_s):
 
 def test_a_vehicle_without_a_way_in_does_not_enter():
     own = pieces(0.0, -400.0, 16.0)[:0]
-    assert not safe_to_enter(fleet_of(), own, 5.0, True, 0.0, RULES)
+    fleet = fleet_of((pieces(0.0, 300.0, 20.0), STREAM, True))
+    assert not safe_to_enter(fleet, own, 5.0, True, 0.0, RULES)
