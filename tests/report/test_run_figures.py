@@ -19,7 +19,7 @@ def drawn(strategy="mainline-priority", drivers=None, ramp=200.0, seed=1, mps=20
             "stream": ["mainline"] * 4 + ["ramp"] * 4,
             "time_s": times_s * 2,
             "mean_speed_mps": [mps, mps - 2.0, mps - 1.0, 1.0] + [9.0] * 4,
-            "vehicles": [1] * 8,
+            "vehicles": [1, 3, 1, 1] * 2,
         },
         schema=SPEEDS,
     )
@@ -33,7 +33,7 @@ def test_speeds_are_drawn_bin_by_bin_with_a_gap_where_nobody_was():
     faint, bold = axes.get_lines()  # those of the first seed alone
     assert list(faint.get_xdata()) == [0.0, 1.0, 2.0, 3.0, 4.0]  # up to the horizon
     np.testing.assert_array_equal(faint.get_ydata(), [20.0, 18.0, math.nan, 19.0, math.nan])
-    assert bold.get_ydata() == pytest.approx([19.0] * 5)  # all within a minute
+    assert bold.get_ydata() == pytest.approx([(20.0 + 3 * 18.0 + 19.0) / 5.0] * 5)
     assert axes.get_ylabel() == "mainline speed (m/s)"
     assert axes.get_xlabel() == "time (s)"
 

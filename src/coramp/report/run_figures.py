@@ -12,7 +12,7 @@ from coramp.metrics.motion import BIN_S
 from coramp.report.style import BLACK, grid, legend_below, look_of, new_figure
 
 SMOOTH_S = 60
-"""Over how many bins of 1 s the bold lines are means."""
+"""Over how many bins of 1 s the bold lines are means, each bin weighed by its vehicles."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,16 @@ def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
 
 def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
     look = look_of(run.strategy, run.drivers)
-    own = run.speeds.filter(stream=stream).select("time_s", "mean_speed_mps")
-    every = pl.DataFrame({"time_s": np.arange(0.0, run.horizon_s, BIN_S)})
-    speeds_mps = every.join(own, on="time_s", how="left", maintain_order="left")["mean_speed_mps"]
-    times_s = every["time_s"].to_numpy()
-    axes.plot(times_s, speeds_mps.to_numpy(), color=look.colour, alpha=0.3, linewidth=0.6)
-    smooth_mps = speeds_mps.rolling_mean(SMOOTH_S, min_samples=1, center=True).to_numpy()
+    bins = pl.DataFrame({"time_s": np.arange(0.0, run.horizon_s, BIN_S)}).join(
+        run.speeds.filter(stream=stream), on="time_s", how="left", maintain_order="left"
+    )
+    times_s, speeds_mps = bins["time_s"].to_numpy(), bins["mean_speed_mps"].to_numpy()
+    axes.plot(times_s, speeds_mps, color=look.colour, alpha=0.3, linewidth=0.6)
+    total, vehicles = (
+        values.rolling_sum(SMOOTH_S, min_samples=1, center=True)
+        for values in (bins["mean_speed_mps"] * bins["vehicles"], bins["vehicles"])
+    )
+    smooth_mps = (total / vehicles).to_numpy()
     apart = max(1, len(times_s) // 10)
     axes.plot(
         times_s,
