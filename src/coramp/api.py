@@ -214,9 +214,7 @@ def study(
     cannot be run; runs that fail are rows of the result.
     """
     definition, seeds = _defined(name, seeds, engine, many)
-    jobs = usable_cores() if jobs is None else jobs
-    if jobs < 1:
-        raise CorampError(f"--jobs: {jobs} is too small; allowed is at least 1")
+    jobs = _jobs_checked(jobs)
     specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
     with connected(cluster) if cluster is not None else nullcontext():
@@ -250,7 +248,14 @@ def outlook(
     searches = bisections(definition, seeds, name)
     folder = _folder_of(definition, out)
     store = Store(folder, definition) if (folder / STUDY_MARK).exists() else None
-    return outlook_of(store, folder, specs, searches, jobs or usable_cores())
+    return outlook_of(store, folder, specs, searches, _jobs_checked(jobs))
+
+
+def _jobs_checked(jobs: int | None) -> int:
+    jobs = usable_cores() if jobs is None else jobs
+    if jobs < 1:
+        raise CorampError(f"--jobs: {jobs} is too small; allowed is at least 1")
+    return jobs
 
 
 def _defined(name: str, seeds: int | None, engine: str | None, many: bool) -> tuple[Study, int]:

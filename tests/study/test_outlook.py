@@ -95,3 +95,13 @@ def test_searches_count_at_most_before_and_as_they_were_after(tmp_path):
     assert (after.runs, after.done, after.searches_at_most, after.expected_s) == (4, 4, 0, 0.0)
     more = outlook(definition, seeds=3, jobs=1, out=folder)
     assert (more.runs, more.done, more.searches_at_most) == (4, 4, 4)
+    upper = result.runs.filter(mainline_veh_h=1600.0, seed=1)["run_id"].item()
+    part = folder / "parts" / f"{upper}.json"
+    part.write_bytes(part.read_bytes()[:-40])
+    seen = outlook(definition, jobs=1, out=folder)
+    assert (seen.runs, seen.damaged, seen.searches_at_most) == (3, 1, 3)
+
+
+def test_the_outlook_refuses_what_the_study_refuses(tmp_path):
+    with pytest.raises(coramp.CorampError, match="--jobs: 0 is too small"):
+        outlook(written(tmp_path), jobs=0, out=tmp_path / "o")

@@ -50,10 +50,19 @@ def outlook_of(
 
     What a search may still take is reckoned at the middle of its range.
     """
+    failed: set[str] = set()
+    damaged: set[str] = set()
 
     def result_of(spec: RunSpec) -> Row | None:
-        part = store.read(spec) if store is not None else None
-        return part.run if part is not None else None
+        part = store.stored(spec) if store is not None else None
+        if part is None:
+            if store is not None and store.is_damaged(spec):
+                damaged.add(spec.run_id)
+            return None
+        if part.run["status"] != "ok":
+            failed.add(spec.run_id)
+            return None
+        return part.run
 
     seen: dict[tuple[str, bool], list[float]] = defaultdict(list)
     missing, likely, done = [], [], 0
@@ -69,11 +78,8 @@ def outlook_of(
         likely += [search.spec_at(search.search.steps // 2)] * left
     per_vehicle_s = {**SECONDS_PER_VEHICLE, **{kind: median(s) for kind, s in seen.items()}}
     expected_s = sum(per_vehicle_s[_kind(s)] * _vehicles(s) for s in (*missing, *likely)) / jobs
-    damaged = sum(store.is_damaged(spec) for spec in missing) if store is not None else 0
-    failed = sum(store.stored(spec) is not None for spec in missing) if store is not None else 0
-    return Outlook(
-        folder, done + len(missing), done, failed, damaged, len(likely), jobs, expected_s
-    )
+    runs = done + len(missing)
+    return Outlook(folder, runs, done, len(failed), len(damaged), len(likely), jobs, expected_s)
 
 
 def _kind(spec: RunSpec) -> tuple[str, bool]:
