@@ -11,9 +11,18 @@ from typing import TYPE_CHECKING, Any
 from coramp.errors import CorampError
 
 if TYPE_CHECKING:
-    from coramp.api import PlanResult, RunResult, StudyResult, plan, run, study
+    from coramp.api import PlanResult, RunResult, StudyResult, figures, plan, run, study
 
-__all__ = ["CorampError", "PlanResult", "RunResult", "StudyResult", "plan", "run", "study"]
+__all__ = [
+    "CorampError",
+    "PlanResult",
+    "RunResult",
+    "StudyResult",
+    "figures",
+    "plan",
+    "run",
+    "study",
+]
 
 
 def __getattr__(name: str) -> Any:

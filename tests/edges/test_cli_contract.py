@@ -580,7 +580,16 @@ def test_an_explanation_is_given_as_json(kept):
 
 @pytest.mark.parametrize(
     "arguments",
-    [(), ("run",), ("study",), ("plan",), ("explain",), ("scenarios",), ("strategies",)],
+    [
+        (),
+        ("run",),
+        ("study",),
+        ("plan",),
+        ("explain",),
+        ("figures",),
+        ("scenarios",),
+        ("strategies",),
+    ],
 )
 def test_help_is_printed_and_has_an_example(arguments):
     told = invoke(*arguments, "--help")
