@@ -47,11 +47,15 @@ class RunResult:
     speeds: pl.DataFrame
     trajectories: pl.DataFrame | None
     decisions: pl.DataFrame | None
+    positions: pl.DataFrame | None
+    violations: pl.DataFrame
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:
-        """The records by name; trajectories and decisions only of cooperative runs."""
+        """The records by name; positions, or trajectories and decisions if cooperative."""
         every = {
+            "positions": self.positions,
+            "violations": self.violations,
             "vehicles": self.vehicles,
             "speeds": self.speeds,
             "trajectories": self.trajectories,
@@ -189,7 +193,14 @@ def run(
 def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
     tables, row = execute(spec, options)
     return RunResult(
-        spec, row, tables.vehicles, tables.speeds, tables.trajectories, tables.decisions
+        spec,
+        row,
+        tables.vehicles,
+        tables.speeds,
+        tables.trajectories,
+        tables.decisions,
+        tables.positions,
+        tables.violations,
     )
 
 

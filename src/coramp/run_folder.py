@@ -8,27 +8,46 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.files import read_json, write_json, write_parquet
+from coramp.metrics.schemas import RESULT_VERSION
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, finite_or_none, versions
+from coramp.scenario import Scenario
 
 MARK = "run.json"
-TABLES = ("vehicles", "trajectories", "decisions", "speeds")
+TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
 
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run as read from its folder; trajectories and decisions only of cooperative runs."""
+    """A run as read from its folder.
+
+    There are trajectories and decisions only of cooperative runs, and positions of the others.
+    Violations and positions are None where the run was written by a coramp that kept none.
+    """
 
     content: Row
     vehicles: pl.DataFrame
     speeds: pl.DataFrame
     trajectories: pl.DataFrame | None
     decisions: pl.DataFrame | None
+    positions: pl.DataFrame | None = None
+    violations: pl.DataFrame | None = None
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that was run."""
+        return Scenario.model_validate(self.content["specification"], strict=False)
 
 
 def run_content(spec: RunSpec, row: Row) -> Row:
     """Returns what ``run.json`` holds and ``coramp run --json`` prints."""
-    content = {"kind": "run", **spec.as_data(), "versions": versions(), "summary": row}
+    content = {
+        "kind": "run",
+        "result_version": RESULT_VERSION,
+        **spec.as_data(),
+        "versions": versions(),
+        "summary": row,
+    }
     return {key: finite_or_none(value) for key, value in content.items()}
 
 
@@ -49,6 +68,7 @@ def read_run(folder: Path) -> StoredRun:
     content = read_json(folder / MARK)
     if not isinstance(content, dict) or content.get("kind") != "run" or "summary" not in content:
         raise CorampError(f"{folder / MARK}: does not describe a run; run again to write it anew")
+    check_version(folder, content)
     frames = {}
     for name in TABLES:
         path = folder / f"{name}.parquet"
@@ -59,4 +79,15 @@ def read_run(folder: Path) -> StoredRun:
     vehicles, speeds = frames["vehicles"], frames["speeds"]
     if vehicles is None or speeds is None:
         raise CorampError(f"{folder}: is not complete; run again with the same --out")
-    return StoredRun(content, vehicles, speeds, frames["trajectories"], frames["decisions"])
+    others = ("trajectories", "decisions", "positions", "violations")
+    return StoredRun(content, vehicles, speeds, *(frames[name] for name in others))
+
+
+def check_version(folder: Path, content: Row) -> None:
+    """Raises CorampError where a folder's results are of a newer format than this coramp's."""
+    version = content.get("result_version", 0)
+    if not isinstance(version, int) or version > RESULT_VERSION:
+        raise CorampError(
+            f"{folder}: was written by a newer coramp (results {version}); this one reads up to "
+            f"{RESULT_VERSION}: update coramp, or run again"
+        )

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from coramp.coordination.coordinator import DecisionRecord, Refusal
-from coramp.metrics.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES
+from coramp.metrics.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS
 from coramp.metrics.tables import (
     decisions_table,
     tables_of,
@@ -174,7 +174,13 @@ def test_trajectories_name_vehicle_and_lane_of_each_piece():
         Car("m00001", ((0.0, -400.0, 20.0, 0.0),)),
         Car("r00001", ((0.0, -400.0, 16.0, 0.0), (25.0, 0.0, 16.0, 2.0), (27.0, 36.0, 20.0, 0.0))),
     ]
-    table = trajectories_table(outcome_of(cars, end_s=60.0, lane=np.array([2, 0, 1, 2])))
+    outcome = outcome_of(cars, end_s=60.0)
+    table = trajectories_table(
+        outcome.passages.vehicle_id,
+        outcome.pieces.first,
+        outcome.pieces.rows,
+        np.array([2, 0, 1, 2]),
+    )
     assert dict(table.schema) == TRAJECTORIES
     assert rows(table, "vehicle_id", "lane", "time_s", "accel_mps2") == [
         ("m00001", "mainline", 0.0, 0.0),
@@ -266,3 +272,27 @@ def test_no_number_in_a_table_is_nan():
         assert not frame.select(pl.col(pl.Float64).is_nan().any()).transpose().to_series().any()
     figures = [*tables.metrics.values(), *(v for s in tables.streams for v in s.values())]
     assert not any(isinstance(value, float) and math.isnan(value) for value in figures)
+
+
+def test_each_violation_is_told_with_its_pair_and_time():
+    """At 20 m/s behind a vehicle at rest Eq. 1 asks for 0.04 m + 72^2 / (254 0.51) = 40.06 m."""
+    cars = [
+        Car("m00001", ((0.0, 0.0, 0.0, 0.0),), exit_s=NEVER),
+        Car("m00002", ((0.0, -55.0, 20.0, -5.0), (4.0, -15.0, 0.0, 0.0)), exit_s=NEVER),
+        Car("m00003", ((0.0, -200.0, 1.0, 0.0),), exit_s=NEVER),
+    ]
+    outcome = outcome_of(cars, end_s=20.0)
+    table = tables_of(outcome, PAPER).violations
+    assert dict(table.schema) == VIOLATIONS
+    assert rows(table, "front_vehicle_id", "rear_vehicle_id") == []
+    near = Car("m00002", ((0.0, -30.0, 20.0, -8.0), (2.5, -5.0, 0.0, 0.0)), exit_s=NEVER)
+    nearer = [cars[0], near, cars[2]]
+    tables = tables_of(outcome_of(nearer, end_s=20.0), PAPER)
+    assert tables.metrics["safety_violations"] == 1
+    [(front, rear, time_s, margin_m)] = rows(
+        tables.violations, "front_vehicle_id", "rear_vehicle_id", "time_s", "margin_m"
+    )
+    assert (front, rear) == ("m00001", "m00002")
+    assert time_s == pytest.approx(0.0)
+    assert margin_m == pytest.approx(25.0 - 0.04 - 72.0**2 / (254 * 0.51), abs=1e-4)
+    assert margin_m == tables.metrics["min_margin_m"]

@@ -59,6 +59,13 @@ DECISIONS: Schema = {
     "rear_station_m": pl.Float64,
 }
 
+VIOLATIONS: Schema = {
+    "time_s": pl.Float64,
+    "front_vehicle_id": pl.String,
+    "rear_vehicle_id": pl.String,
+    "margin_m": pl.Float64,
+}
+
 SPEEDS: Schema = {
     "stream": pl.String,
     "time_s": pl.Float64,

@@ -29,6 +29,8 @@ from coramp.core.trajectory import (
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""
 MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS = range(5)
+FIGURES, NOTED = 5, 4
+"""How many figures there are, and how many numbers tell of one violation."""
 
 
 class LaneUse(NamedTuple):
@@ -47,13 +49,17 @@ class LaneUse(NamedTuple):
 
 
 @kernel
-def lane_extremes(lane: LaneUse, merge_angle_rad: float, safety: SafetyBudget) -> FloatArray:
+def lane_extremes(
+    lane: LaneUse, merge_angle_rad: float, safety: SafetyBudget, room: int = 0
+) -> FloatArray:
     """Returns min margin (m), min TTC (s), max DRAC (m/s2), max severity (m2/s4), violations.
 
     The margin is over Eq. 1. A violation is a pair of neighbours that come nearer than that, or at
-    a lane change nearer than Eq. 15 or 16.
+    a lane change nearer than Eq. 15 or 16. The first ``room`` of them follow, four numbers each:
+    time (s) of the least margin, front vehicle, rear vehicle, margin (m).
     """
-    extremes = np.array([math.inf, math.inf, 0.0, 0.0, 0.0])
+    extremes = np.zeros(FIGURES + NOTED * room)
+    extremes[MARGIN] = extremes[TTC] = math.inf
     times_s, kinds, vehicles = lane_events(lane)
     order = np.empty(len(lane.from_s), np.int64)
     since_s = np.empty(len(lane.from_s))
@@ -144,18 +150,26 @@ def _end_pair(
     safety: SafetyBudget,
 ) -> None:
     ahead, behind = driven(lane, front), driven(lane, rear)
-    margin_m, _ = smallest_margin_m(ahead, lane.length_m[front], behind, start_s, end_s, safety)
-    _note_margin(extremes, margin_m)
+    margin_m, least_s = smallest_margin_m(
+        ahead, lane.length_m[front], behind, start_s, end_s, safety
+    )
+    extremes[MARGIN] = min(extremes[MARGIN], margin_m)
+    if margin_m < 0.0:
+        _note_violation(extremes, least_s, front, rear, margin_m)
     ttc_s, drac_mps2 = closing_extremes(ahead, lane.length_m[front], behind, start_s, end_s)
     extremes[TTC] = min(extremes[TTC], ttc_s)
     extremes[DRAC] = max(extremes[DRAC], drac_mps2)
 
 
 @kernel
-def _note_margin(extremes: FloatArray, margin_m: float) -> None:
-    extremes[MARGIN] = min(extremes[MARGIN], margin_m)
-    if margin_m < 0.0:
-        extremes[VIOLATIONS] += 1.0
+def _note_violation(
+    extremes: FloatArray, time_s: float, front: int, rear: int, margin_m: float
+) -> None:
+    place = FIGURES + NOTED * int(extremes[VIOLATIONS])
+    if place < len(extremes):
+        extremes[place], extremes[place + 1] = time_s, front
+        extremes[place + 2], extremes[place + 3] = rear, margin_m
+    extremes[VIOLATIONS] += 1.0
 
 
 @kernel
@@ -170,14 +184,15 @@ def _look_at_merge(
 ) -> None:
     own_m, own_mps = station_and_speed(driven(lane, merging), now_s)
     other_m, other_mps = station_and_speed(driven(lane, other), now_s)
-    if other_m >= own_m:
-        distance_m = other_m - lane.length_m[other] - own_m
-    else:
+    front, rear = other, merging
+    distance_m = other_m - lane.length_m[other] - own_m
+    if other_m < own_m:
+        front, rear = merging, other
         distance_m = own_m - lane.length_m[merging] - other_m
     along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
     margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
     if margin_m < 0.0:
-        extremes[VIOLATIONS] += 1.0
+        _note_violation(extremes, now_s, front, rear, margin_m)
     severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)
 

@@ -12,17 +12,20 @@ import polars as pl
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
+from coramp.metrics.fitting import fitted_pieces
 from coramp.metrics.motion import BIN_S, binned_motion, fuel_of_each_l, hardest_braking_mps2
-from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, Schema
+from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS, Schema
 from coramp.metrics.separations import (
     DRAC,
+    FIGURES,
     MARGIN,
+    NOTED,
     SEVERITY,
     TTC,
-    VIOLATIONS,
     LaneUse,
     lane_extremes,
 )
+from coramp.metrics.separations import VIOLATIONS as COUNT
 from coramp.records import LANES, Outcome
 from coramp.scenario import Scenario
 from coramp.strategies.situation import RUNGS
@@ -42,10 +45,23 @@ class RunTables:
     """
 
     outcome: Outcome
+    scenario: Scenario
     vehicle_columns: Columns
     speed_columns: Columns
     metrics: Row
     streams: list[Row]
+
+    def frames(self) -> dict[str, pl.DataFrame]:
+        """Returns all tables of the run by name, as they are written."""
+        every = {
+            "vehicles": self.vehicles,
+            "speeds": self.speeds,
+            "trajectories": self.trajectories,
+            "decisions": self.decisions,
+            "positions": self.positions,
+            "violations": self.violations,
+        }
+        return {name: frame for name, frame in every.items() if frame is not None}
 
     @cached_property
     def vehicles(self) -> pl.DataFrame:
@@ -64,7 +80,26 @@ class RunTables:
     @cached_property
     def trajectories(self) -> pl.DataFrame | None:
         """One row a driven piece."""
-        return trajectories_table(self.outcome) if self.outcome.cooperative else None
+        outcome = self.outcome
+        if not outcome.cooperative:
+            return None
+        return trajectories_table(
+            outcome.passages.vehicle_id, outcome.pieces.first, outcome.pieces.rows, outcome.lane
+        )
+
+    @cached_property
+    def positions(self) -> pl.DataFrame | None:
+        """One row a piece fitted to what drivers drove, within 5 cm; None for plans."""
+        outcome = self.outcome
+        if outcome.cooperative:
+            return None
+        fitted = fitted_pieces(outcome.pieces.first, outcome.pieces.rows, outcome.lane)
+        return trajectories_table(outcome.passages.vehicle_id, *fitted)
+
+    @cached_property
+    def violations(self) -> pl.DataFrame:
+        """One row a pair that came nearer than the safe distance."""
+        return violations_table(self.outcome, self.scenario, self.metrics["safety_violations"])
 
     @cached_property
     def decisions(self) -> pl.DataFrame | None:
@@ -86,7 +121,7 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **safety_figures(outcome, scenario),
         **_decision_figures(outcome),
     }
-    return RunTables(outcome, vehicles, speeds, metrics, streams)
+    return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 
 
 def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
@@ -152,18 +187,36 @@ def speed_columns(outcome: Outcome) -> Columns:
     }
 
 
-def trajectories_table(outcome: Outcome) -> pl.DataFrame:
-    """Returns one row a driven piece."""
-    pieces, names = outcome.pieces, outcome.passages.vehicle_id
-    counts = np.diff(pieces.first)
+def trajectories_table(
+    names: Sequence[str], first: IntArray, rows: FloatArray, lane: IntArray
+) -> pl.DataFrame:
+    """Returns one row a piece; vehicle i's are ``rows[first[i] : first[i + 1]]``."""
+    counts = np.diff(first)
     return _frame(
         TRAJECTORIES,
         vehicle_id=[name for name, n in zip(names, counts, strict=True) for _ in range(n)],
-        lane=[LANES[code] for code in outcome.lane],
-        time_s=pieces.rows[:, 0],
-        station_m=pieces.rows[:, 1],
-        speed_mps=pieces.rows[:, 2],
-        accel_mps2=pieces.rows[:, 3],
+        lane=[LANES[code] for code in lane],
+        time_s=rows[:, 0],
+        station_m=rows[:, 1],
+        speed_mps=rows[:, 2],
+        accel_mps2=rows[:, 3],
+    )
+
+
+def violations_table(outcome: Outcome, scenario: Scenario, count: int) -> pl.DataFrame:
+    """Returns the ``count`` violations of a run, by time; at which the margin was least."""
+    lanes = _extremes_of_lanes(outcome, scenario, count)
+    noted = np.concatenate(
+        [lane[FIGURES : FIGURES + NOTED * int(lane[COUNT])].reshape(-1, NOTED) for lane in lanes]
+    )
+    noted = noted[np.argsort(noted[:, 0], kind="stable")]
+    names = outcome.passages.vehicle_id
+    return _frame(
+        VIOLATIONS,
+        time_s=noted[:, 0],
+        front_vehicle_id=[names[int(front)] for front in noted[:, 1]],
+        rear_vehicle_id=[names[int(rear)] for rear in noted[:, 2]],
+        margin_m=noted[:, 3],
     )
 
 
@@ -232,6 +285,21 @@ def _stream_metrics(streams: list[Row]) -> Row:
 
 def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     """Returns how near vehicles came and how hard they braked; null where no two met."""
+    mainline, ramp = _extremes_of_lanes(outcome, scenario)
+    return {
+        "collisions": outcome.collisions,
+        "safety_violations": int(mainline[COUNT] + ramp[COUNT]),
+        "min_margin_m": _finite(min(mainline[MARGIN], ramp[MARGIN])),
+        "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
+        "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
+        "max_severity": float(mainline[SEVERITY]),
+        "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
+        "plan_error_m": _largest(outcome.passages.plan_error_m),
+    }
+
+
+def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:
+    """What ``lane_extremes`` finds on the mainline and on the ramp."""
     passages, driven = outcome.passages, outcome.driven
     rules = scenario.rules()
     until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
@@ -249,18 +317,8 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
             to_s,
             passages.on_ramp & (from_s is on_mainline_s),
         )
-        extremes.append(lane_extremes(lane, rules.road.merge_angle_rad, rules.safety))
-    mainline, ramp = extremes
-    return {
-        "collisions": outcome.collisions,
-        "safety_violations": int(mainline[VIOLATIONS] + ramp[VIOLATIONS]),
-        "min_margin_m": _finite(min(mainline[MARGIN], ramp[MARGIN])),
-        "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
-        "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
-        "max_severity": float(mainline[SEVERITY]),
-        "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
-        "plan_error_m": _largest(passages.plan_error_m),
-    }
+        extremes.append(lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room))
+    return extremes
 
 
 def _finite(value: float) -> float | None:

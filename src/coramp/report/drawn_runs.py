@@ -58,9 +58,7 @@ def drawn_runs(
     for done, spec in enumerate(missing, 1):
         with staged_folder(folder / spec.run_id, MARK) as stage:
             tables, row = execute(spec)
-            frames = {"vehicles": tables.vehicles, "speeds": tables.speeds}
-            if tables.decisions is not None:
-                frames["decisions"] = tables.decisions
+            frames = tables.frames()
             write_run(stage, spec, frames, row)
         report(Progress(len(specs), done, skipped, 0, 0, Part(row, [])))
     return [_drawn(spec, read_run(folder / spec.run_id)) for spec in specs]
