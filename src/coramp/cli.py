@@ -217,12 +217,22 @@ def explain(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
     vehicle: Annotated[str, typer.Argument(help="A vehicle's id, such as r00012.")],
     json: Json = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw the decision: road and time-space diagram (png, svg or pdf)."),
+    ] = None,
 ) -> None:
     """Tell one vehicle's story: why it got its plan, with the equations' numbers."""
     from coramp.console import print_json, print_story, story_json
-    from coramp.story import story_of
+    from coramp.run_folder import read_run
+    from coramp.story import story_in
 
-    story = story_of(folder, vehicle)
+    run = read_run(folder)
+    story = story_in(run, vehicle, folder)
+    if plot is not None:
+        from coramp.report.story_figure import save_story_figure
+
+        save_story_figure(run, vehicle, plot)
     if json:
         print_json(story_json(story))
     else:

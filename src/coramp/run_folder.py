@@ -38,6 +38,26 @@ class StoredRun:
         """The scenario that was run."""
         return Scenario.model_validate(self.content["specification"], strict=False)
 
+    def vehicle(self, vehicle_id: str) -> Row:
+        """Returns a vehicle's row; raises CorampError where there is none such."""
+        found = self.vehicles.filter(vehicle_id=vehicle_id)
+        if found.is_empty():
+            known = sorted(self.vehicles["vehicle_id"].to_list())
+            allowed = f"allowed are {known[0]} to {known[-1]}" if known else "nobody arrived"
+            raise CorampError(f"there is no vehicle {vehicle_id!r}; {allowed}")
+        return found.row(0, named=True)
+
+    def coordinated(self, what: str) -> tuple[pl.DataFrame, pl.DataFrame]:
+        """Returns trajectories and decisions; ``what`` is what they are wanted for, as a verb.
+
+        Raises CorampError for a run in which nobody was coordinated, or where one is lost.
+        """
+        if self.trajectories is None and self.decisions is None:
+            raise CorampError(f"nobody was coordinated in this run; {what} a cooperative one")
+        if self.trajectories is None or self.decisions is None:
+            raise CorampError("is not complete; run again with the same --out")
+        return self.trajectories, self.decisions
+
 
 def run_content(spec: RunSpec, row: Row) -> Row:
     """Returns what ``run.json`` holds and ``coramp run --json`` prints."""
@@ -91,3 +111,9 @@ def check_version(folder: Path, content: Row) -> None:
             f"{folder}: was written by a newer coramp (results {version}); this one reads up to "
             f"{RESULT_VERSION}: update coramp, or run again"
         )
+
+
+def moved_for(decisions: pl.DataFrame, vehicle_id: str) -> list[Row]:
+    """Returns the decisions about others that moved a vehicle aside or braked it."""
+    moved = pl.col("adjusted_vehicle_ids").list.contains(vehicle_id).fill_null(value=False)
+    return decisions.filter(moved).rows(named=True)

@@ -7,8 +7,7 @@ from typing import Any
 from coramp.errors import CorampError
 from coramp.explanation import Quantity, quantities
 from coramp.metrics.tables import Row
-from coramp.run_folder import StoredRun, read_run
-from coramp.scenario import Scenario
+from coramp.run_folder import StoredRun, moved_for, read_run
 
 
 @dataclass(frozen=True)
@@ -30,38 +29,29 @@ class Story:
 
 
 def story_of(folder: Path, vehicle_id: str) -> Story:
-    """Returns the story of a vehicle of a run.
+    """Returns the story of a vehicle of a run, from its folder.
 
     Raises CorampError where there is no run, no such vehicle, or nothing was planned.
     """
-    run = read_run(folder)
-    found = run.vehicles.filter(vehicle_id=vehicle_id)
-    if found.is_empty():
-        known = sorted(run.vehicles["vehicle_id"].to_list())
-        allowed = f"allowed are {known[0]} to {known[-1]}" if known else "nobody arrived"
-        raise CorampError(f"{folder}: there is no vehicle {vehicle_id!r}; {allowed}")
-    if run.decisions is None:
-        raise CorampError(
-            f"{folder}: nobody was coordinated in this run; explain a cooperative one"
-        )
-    decisions = run.decisions.filter(vehicle_id=vehicle_id)
-    scenario = Scenario.model_validate(run.content["specification"], strict=False)
+    return story_in(read_run(folder), vehicle_id, folder)
+
+
+def story_in(run: StoredRun, vehicle_id: str, folder: Path | None = None) -> Story:
+    """Returns the story of a vehicle of a run that is at hand; errors name the ``folder``, if any.
+
+    Raises CorampError where there is no such vehicle, or nothing was planned.
+    """
+    try:
+        vehicle, decisions = run.vehicle(vehicle_id), run.coordinated("explain")[1]
+    except CorampError as error:
+        raise CorampError(f"{folder}: {error}" if folder is not None else str(error)) from None
+    about = decisions.filter(vehicle_id=vehicle_id)
     return Story(
-        found.row(0, named=True),
-        [Chapter(row, quantities(row, scenario)) for row in decisions.iter_rows(named=True)],
-        _moved_for(run, vehicle_id),
+        vehicle,
+        [Chapter(row, quantities(row, run.scenario)) for row in about.iter_rows(named=True)],
+        moved_for(decisions, vehicle_id),
         {key: run.content[key] for key in ("scenario", "strategy", "seed", "run_id")},
     )
-
-
-def _moved_for(run: StoredRun, vehicle_id: str) -> list[Row]:
-    if run.decisions is None:
-        return []
-    return [
-        row
-        for row in run.decisions.iter_rows(named=True)
-        if vehicle_id in (row["adjusted_vehicle_ids"] or [])
-    ]
 
 
 def told(decision: dict[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """The time-space diagram of a plan, before and after."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 
 from coramp._kernel import FloatArray
 from coramp.core.trajectory import station_and_speed
-from coramp.errors import CorampError
 from coramp.planning import PlannedSnapshot
 from coramp.report.style import (
     BLUE,
@@ -21,7 +20,7 @@ from coramp.report.style import (
     grid,
     legend_below,
     new_figure,
-    save_figure,
+    save_plot,
 )
 
 RAMP_COLOUR, MOVED_COLOUR, MAINLINE_COLOUR = VERMILION, BLUE, GREY
@@ -37,13 +36,7 @@ def save_plan_figure(planned: PlannedSnapshot, path: Path) -> None:
 
     Raises CorampError where that cannot be written.
     """
-    allowed = "allowed are png, svg and pdf files"
-    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise CorampError(f"--plot: {path}: the ending says no format; {allowed}")
-    try:
-        save_figure(plan_figure(planned), path, dpi=150)
-    except CorampError as error:
-        raise CorampError(f"--plot: {error}; {allowed}") from error
+    save_plot(lambda: plan_figure(planned), path)
 
 
 def plan_figure(planned: PlannedSnapshot) -> Figure:
@@ -112,28 +105,33 @@ def draw_trajectories(
         axes.plot(times_s, stations_m, color=colour, linewidth=width, label=label, gid=name)
 
 
-def name_lines(axes: Axes) -> None:
+def name_lines(axes: Axes, names: Collection[str] | None = None) -> None:
     """Writes each vehicle's name beside the right edge, further out where lines are close.
 
-    Lines that leave through the upper edge are named there.
+    Lines that leave through the upper edge are named there. ``names`` are who is named, default:
+    everyone.
     """
     edge_s, (low_m, high_m) = axes.get_xlim()[1], axes.get_ylim()
     ends = []
     for line in axes.get_lines():
+        if names is not None and line.get_gid() not in names:
+            continue
         times_s, stations_m = (np.asarray(data, dtype=float) for data in line.get_data())
         ends.append((float(np.interp(edge_s, times_s, stations_m)), line))
-    last_m, column = -np.inf, 0
+    near_m, columns_m = NEAR_NAMES * (high_m - low_m), [-np.inf]
+    width_pt = max([NAME_WIDTH_PT, *(5.6 * len(str(line.get_gid())) for _, line in ends)])
     for station_m, line in sorted(ends, key=lambda end: end[0]):
         if station_m > high_m:
             _name_at_the_top(axes, line, high_m)
         if not low_m <= station_m <= high_m:
             continue
-        column = column + 1 if station_m - last_m < NEAR_NAMES * (high_m - low_m) else 0
-        last_m = station_m
+        free = [k for k, last_m in enumerate(columns_m) if station_m - last_m >= near_m]
+        column = free[0] if free else len(columns_m)
+        columns_m[column : column + 1] = [station_m]
         axes.annotate(
             str(line.get_gid()),
             (edge_s, station_m),
-            (3.0 + NAME_WIDTH_PT * column, 0.0),
+            (3.0 + width_pt * column, 0.0),
             textcoords="offset points",
             va="center",
             fontsize=7.5,

@@ -5,7 +5,7 @@ differ as well, so that a print in grey can be read.
 """
 
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coramp.errors import CorampError
 from coramp.files import write_bytes
 
 BLUE, VERMILION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
@@ -76,10 +77,17 @@ def _use_our_settings() -> None:
         mpl.rcParams[key] = value  # type: ignore[index]
 
 
+class ShownFigure(Figure):
+    """A figure that notebooks show as it is, whatever backend they have."""
+
+    def _repr_png_(self) -> bytes:
+        return _content(self, "png", DPI)
+
+
 def new_figure(width_in: float, height_in: float) -> Figure:
     """Returns an empty figure of a size in inches; figures are 6 to 11 in wide."""
     _use_our_settings()
-    return Figure(figsize=(width_in, height_in), layout="constrained")
+    return ShownFigure(figsize=(width_in, height_in), layout="constrained")
 
 
 def grid(*many: Axes) -> None:
@@ -104,8 +112,28 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> Path:
 
     The same figure gives the same bytes. Raises CorampError where it cannot be written.
     """
-    _use_our_settings()
-    content, kind = io.BytesIO(), path.suffix.lower().lstrip(".")
-    figure.savefig(content, format=kind, dpi=dpi, metadata=UNDATED[kind])
-    write_bytes(path, content.getvalue())
+    write_bytes(path, _content(figure, path.suffix.lower().lstrip("."), dpi))
     return path
+
+
+def _content(figure: Figure, kind: str, dpi: int) -> bytes:
+    _use_our_settings()
+    content = io.BytesIO()
+    figure.savefig(content, format=kind, dpi=dpi, metadata=UNDATED[kind])
+    return content.getvalue()
+
+
+def save_plot(draw: Callable[[], Figure], path: Path) -> None:
+    """Writes what is drawn to the file of an option ``--plot``; its ending says how.
+
+    Raises CorampError where that cannot be written; nothing is drawn for an ending that says no
+    format.
+    """
+    allowed = "allowed are png, svg and pdf files"
+    if path.suffix.lower().lstrip(".") not in UNDATED:
+        raise CorampError(f"--plot: {path}: the ending says no format; {allowed}")
+    figure = draw()
+    try:
+        save_figure(figure, path, dpi=150)
+    except CorampError as error:
+        raise CorampError(f"--plot: {error}; {allowed}") from error
