@@ -14,7 +14,8 @@ from coramp.explanation import Quantity, quantities
 from coramp.files import made_folder, staged_folder
 from coramp.metrics.tables import Row
 from coramp.planning import PlannedSnapshot, plan_snapshot
-from coramp.run_folder import MARK, run_content, write_run
+from coramp.plots import PlanPlots, RunPlots, StudyPlots
+from coramp.run_folder import MARK, StoredRun, run_content, write_run
 from coramp.running import RunSpec, broken_promises, engine_checked, execute, make_spec
 from coramp.snapshots import load_snapshot
 from coramp.studies.breakdown import bisections
@@ -38,7 +39,7 @@ MANY_RUNS = 100_000
 
 
 @dataclass(frozen=True)
-class RunResult:
+class RunResult(RunPlots):
     """A run: its summary (the row of ``runs.parquet``) and its records as polars frames."""
 
     spec: RunSpec
@@ -69,6 +70,19 @@ class RunResult:
         return broken_promises(self.summary)
 
     @property
+    def stored(self) -> StoredRun:
+        """The run as it would be read from its folder."""
+        return StoredRun(
+            self.content,
+            self.vehicles,
+            self.speeds,
+            self.trajectories,
+            self.decisions,
+            self.positions,
+            self.violations,
+        )
+
+    @property
     def content(self) -> Row:
         """What ``run.json`` holds: specification, versions and summary."""
         return run_content(self.spec, self.summary)
@@ -79,13 +93,17 @@ class RunResult:
 
 
 @dataclass(frozen=True)
-class StudyResult:
-    """A study: one row a run, one row a run and stream, and the tables that sum them up."""
+class StudyResult(StudyPlots):
+    """A study: one row a run, one row a run and stream, and the tables that sum them up.
+
+    ``layout`` is what kind of study it is: plain, paper, sensitivity or capacity.
+    """
 
     folder: Path
     runs: pl.DataFrame
     streams: pl.DataFrame
     tables: tuple[Table, ...]
+    layout: str = "plain"
 
     @property
     def failed(self) -> pl.DataFrame:
@@ -108,7 +126,7 @@ class StudyResult:
 
 
 @dataclass(frozen=True)
-class PlanResult:
+class PlanResult(PlanPlots):
     """Decisions on a snapshot, and all trajectories before and after them."""
 
     planned: PlannedSnapshot
@@ -241,7 +259,7 @@ def study(
         from coramp.report.capacity_figure import save_capacity_figure
 
         save_capacity_figure(runs, store.folder / "capacity.png")
-    return StudyResult(store.folder, runs, streams, tuple(tables))
+    return StudyResult(store.folder, runs, streams, tuple(tables), definition.layout)
 
 
 def outlook(

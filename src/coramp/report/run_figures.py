@@ -54,6 +54,23 @@ def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
     return figure
 
 
+def both_speeds_figure(run: DrawnRun) -> Figure:
+    """Returns the mean speed (m/s) of mainline and ramp over time (s) in one run.
+
+    Faint lines are bins of 1 s, bold ones means over a minute.
+    """
+    figure = new_figure(9.0, 4.6)
+    diagrams = figure.subplots(2, 1, sharex=True)
+    for axes, stream in zip(diagrams, ("mainline", "ramp"), strict=True):
+        _draw_speed(axes, run, stream)
+        axes.set(ylabel=f"{stream} speed (m/s)", xlim=(0.0, run.horizon_s))
+    flows = f"{run.mainline_veh_h:g} + {run.ramp_veh_h:g} veh/h"
+    diagrams[0].set_title(f"{look_of(run.strategy, run.drivers).label}, {flows}, seed {run.seed}")
+    diagrams[1].set_xlabel("time (s)")
+    grid(*diagrams)
+    return figure
+
+
 def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
     look = look_of(run.strategy, run.drivers)
     bins = pl.DataFrame({"time_s": np.arange(0.0, run.horizon_s, BIN_S)}).join(

@@ -1,0 +1,83 @@
+"""Station over time of everyone in a run, within a window of time."""
+
+import math
+
+from matplotlib.figure import Figure
+
+from coramp.errors import CorampError
+from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
+from coramp.report.story_scene import Driven, driven_of
+from coramp.report.style import YELLOW, grid, legend_below, new_figure
+from coramp.run_folder import StoredRun
+
+WINDOW_S = 120.0
+"""How long the window is where its end is not given."""
+STEP_S = 0.25
+
+
+def run_time_space_figure(
+    run: StoredRun, from_s: float | None = None, until_s: float | None = None
+) -> Figure:
+    """Returns station (m) over time (s) of all vehicles of a cooperative run, a line each.
+
+    From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges; the gid
+    of a line is its vehicle's id. Raises CorampError for a run in which nobody was coordinated and
+    for an empty window.
+    """
+    trajectories, decisions = run.coordinated("plot")
+    from_s = 0.0 if from_s is None else from_s
+    until_s = from_s + WINDOW_S if until_s is None else until_s
+    if not (math.isfinite(from_s) and math.isfinite(until_s) and from_s < until_s):
+        raise CorampError(f"until_s: {until_s:g} is not after from_s; allowed is above {from_s:g}")
+    moved = set(decisions["adjusted_vehicle_ids"].explode().drop_nulls())
+    figure = new_figure(10.0, 5.6)
+    axes = figure.subplots()
+    lane_m = run.scenario.ramp.acceleration_lane_m
+    axes.axhspan(0.0, lane_m, color=YELLOW, alpha=0.25, label="acceleration lane")
+    for name, driven in driven_of(trajectories, run.vehicles).items():
+        times_s, stations_m = driven.line(from_s, until_s, STEP_S)
+        if len(times_s):
+            colour, label, width_pt = _look(driven, name in moved)
+            axes.plot(times_s, stations_m, color=colour, linewidth=width_pt, label=label, gid=name)
+    within = decisions.drop_nulls("merge_time_s")
+    within = within.filter(within["merge_time_s"].is_between(from_s, until_s))
+    if not within.is_empty():
+        axes.plot(
+            within["merge_time_s"],
+            within["merge_station_m"],
+            color=RAMP_COLOUR,
+            marker="o",
+            markersize=3.5,
+            linestyle="none",
+            label="merge",
+            gid="merges",
+        )
+    axes.set(
+        title=_title(run),
+        xlim=(from_s, until_s),
+        ylim=(_start_m(run), run.scenario.mainline.end_m),
+        xlabel="time (s)",
+        ylabel="station of the front bumper (m)",
+    )
+    grid(axes)
+    legend_below(figure, [axes], 5)
+    return figure
+
+
+def _look(driven: Driven, moved: bool) -> tuple[str, str, float]:
+    """A vehicle's colour, name in the legend and width (pt), as in diagrams of plans."""
+    if driven.merge_s > -math.inf:
+        return RAMP_COLOUR, "ramp vehicle", 1.2
+    if moved:
+        return MOVED_COLOUR, "moves aside", 1.0
+    return MAINLINE_COLOUR, "mainline vehicle", 0.7
+
+
+def _title(run: StoredRun) -> str:
+    content = run.content
+    flows = f"{content['mainline_veh_h']:g} + {content['ramp_veh_h']:g} veh/h"
+    return f"{content['scenario']}: {content['strategy']}, {flows}, seed {content['seed']}"
+
+
+def _start_m(run: StoredRun) -> float:
+    return min(run.scenario.mainline.start_m, run.scenario.ramp.start_m)
