@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from coramp.errors import CorampError
 
 if TYPE_CHECKING:
-    from coramp.api import PlanResult, RunResult, StudyResult, figures, plan, run, study
+    from coramp.api import PlanResult, RunResult, StudyResult, figures, plan, register, run, study
 
 __all__ = [
     "CorampError",
@@ -20,6 +20,7 @@ __all__ = [
     "StudyResult",
     "figures",
     "plan",
+    "register",
     "run",
     "study",
 ]

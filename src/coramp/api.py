@@ -1,4 +1,4 @@
-"""What notebooks and the command line call: run, study, plan, figures."""
+"""What notebooks and the command line call: run, study, plan, figures, register."""
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
@@ -18,6 +18,7 @@ from coramp.plots import PlanPlots, RunPlots, StudyPlots
 from coramp.run_folder import MARK, StoredRun, run_content, write_run
 from coramp.running import RunSpec, broken_promises, engine_checked, execute, make_spec
 from coramp.snapshots import load_snapshot
+from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
 from coramp.studies.cluster import connected
 from coramp.studies.definition import Study, count_runs, expand, load_study, sort_key
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from coramp.report.figures import FigureSet
 
 
+register = registry.register
 MANY_RUNS = 100_000
 """More runs than this are asked about first."""
 

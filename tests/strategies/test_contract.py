@@ -88,6 +88,21 @@ def test_names_are_unique():
         register(strategies()["mainline-priority"])
 
 
+def test_a_strategy_of_ones_own_can_take_its_own_place_but_not_that_of_ours(monkeypatch):
+    monkeypatch.setattr("coramp.strategies.registry._STRATEGIES", strategies())
+    mine, again = (type("Mine", (), {"name": "mine", "summary": "x"}) for _ in range(2))
+    register(mine)
+    with pytest.raises(CorampError, match=r"'mine' is registered twice; .* replace=True"):
+        register(again)
+    assert strategy_named("mine") is mine
+    register(again, replace=True)
+    assert strategy_named("mine") is again
+    ours = strategies()["mainline-priority"]
+    with pytest.raises(CorampError, match="coramp's own"):
+        register(type("Theirs", (), {"name": ours.name}), replace=True)
+    assert strategy_named(ours.name) is ours
+
+
 def test_an_unknown_name_lists_those_that_there_are():
     with pytest.raises(CorampError, match="allowed are mainline-priority, ramp-priority"):
         strategy_named("mainline-prority")
