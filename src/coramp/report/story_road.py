@@ -150,7 +150,12 @@ def _draw_gap(axes: Axes, scene: Scene) -> None:
     low_m, high_m = axes.get_xlim()
     rear_m, front_m = (min(max(edge_m, low_m), high_m) for edge_m in scene.gap_m)
     size_m, required_m = decision["gap_m"], decision["required_gap_m"]
-    size = "open" if size_m is None or math.isinf(size_m) else f"{size_m:.2f} m"
+    ends = [decision[key] is not None for key in ("front_vehicle_id", "rear_vehicle_id")]
+    where = {
+        (True, True): f"gap between X and Y, {size_m:.2f} m",
+        (True, False): "gap behind X, with nobody after it",
+        (False, True): "gap ahead of Y, with nobody before it",
+    }.get((ends[0], ends[1]), "empty mainline")
     axes.add_patch(
         Rectangle(
             (rear_m, -HALF_LANE),
@@ -160,7 +165,7 @@ def _draw_gap(axes: Axes, scene: Scene) -> None:
             alpha=0.25,
             zorder=0.8,
             gid="gap",
-            label=f"gap between X and Y, {size}",
+            label=where,
         )
     )
     from_m, to_m = scene.required_gap_m
