@@ -239,6 +239,36 @@ def explain(
         print_story(story)
 
 
+@app.command(epilog="Example: coramp report out/r --against out/u")
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of a run or a study.")],
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, to stand beside it."),
+    ] = None,
+) -> None:
+    """Write DIR/report.html: one file to hand on, which works without a network."""
+    from coramp.console import written
+    from coramp.reporting import report as write_report
+
+    written(write_report(folder, against, lambda text: print(text, file=sys.stderr)))
+
+
+@app.command(epilog="Example: coramp replay out/r --against out/u")
+def replay(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, to be seen beside it."),
+    ] = None,
+) -> None:
+    """Write DIR/replay.html: the merge from above, to play in a browser."""
+    from coramp.console import written
+    from coramp.reporting import replay as write_replay
+
+    written(write_replay(folder, against))
+
+
 @app.command(epilog="Example: coramp figures --seeds 10 --study out/capacity --out out/figures")
 def figures(
     out: Annotated[

@@ -314,6 +314,11 @@ def figures_json(drawn: "FigureSet") -> Row:
     }
 
 
+def written(path: Path) -> None:
+    """Prints where a page lies."""
+    print(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB); open it in a browser.")
+
+
 class StudyProgress:
     """A bar with rate and remaining time, or a line now and then where there is no terminal."""
 

@@ -10,7 +10,15 @@ import pytest
 
 import coramp
 import coramp.api
-from coramp.metrics.schemas import DECISIONS, RUNS, SPEEDS, STREAMS, TRAJECTORIES, VEHICLES
+from coramp.metrics.schemas import (
+    DECISIONS,
+    RUNS,
+    SPEEDS,
+    STREAMS,
+    TRAJECTORIES,
+    VEHICLES,
+    VIOLATIONS,
+)
 from tests.edges import SMALL_STUDY, everything_below
 
 SCHEMAS = {
@@ -18,6 +26,8 @@ SCHEMAS = {
     "speeds": SPEEDS,
     "trajectories": TRAJECTORIES,
     "decisions": DECISIONS,
+    "positions": TRAJECTORIES,
+    "violations": VIOLATIONS,
 }
 
 
@@ -91,8 +101,8 @@ def test_examples_in_docstrings_work(module):
 
 
 def test_a_run_gives_frames_with_the_columns_of_its_files(cooperative, uncontrolled):
-    assert set(cooperative.frames) == set(SCHEMAS)
-    assert set(uncontrolled.frames) == {"vehicles", "speeds"}
+    assert set(cooperative.frames) == set(SCHEMAS) - {"positions"}
+    assert set(uncontrolled.frames) == {"vehicles", "speeds", "positions", "violations"}
     assert uncontrolled.trajectories is None
     assert uncontrolled.decisions is None
     for result in (cooperative, uncontrolled):

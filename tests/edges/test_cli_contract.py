@@ -165,13 +165,22 @@ def studied(tmp_path_factory):
     return Made(folder / "o", "study", folder / "s.toml", "--jobs", "1")
 
 
+UNCONTROLLED_FILES = [
+    "positions.parquet",
+    "run.json",
+    "speeds.parquet",
+    "vehicles.parquet",
+    "violations.parquet",
+]
+
+
 def test_a_run_leaves_exactly_what_is_promised(kept, uncontrolled):
     sumo_files = ["sumo", *(f"sumo/{name}" for name in SUMO_FILES)]
     tables = [f"{name}.parquet" for name in TABLES]
-    assert everything_below(kept.folder) == sorted(["run.json", *tables, *sumo_files])
-    assert everything_below(uncontrolled.folder) == sorted(
-        ["run.json", "vehicles.parquet", "speeds.parquet", *sumo_files]
+    assert everything_below(kept.folder) == sorted(
+        ["run.json", "violations.parquet", *tables, *sumo_files]
     )
+    assert everything_below(uncontrolled.folder) == sorted([*UNCONTROLLED_FILES, *sumo_files])
 
 
 def test_tables_have_the_promised_columns(kept, uncontrolled):
@@ -290,7 +299,7 @@ def test_a_second_run_takes_the_place_of_the_first(tmp_path):
     short = ("--horizon", "5")
     Made(tmp_path / "r", "run", "paper", *short, "--keep-sumo")
     second = Made(tmp_path / "r", "run", "paper", *short, "-s", "uncontrolled")
-    assert everything_below(second.folder) == ["run.json", "speeds.parquet", "vehicles.parquet"]
+    assert everything_below(second.folder) == UNCONTROLLED_FILES
     assert everything_below(tmp_path) == [
         "r",
         *(f"r/{n}" for n in everything_below(tmp_path / "r")),

@@ -25,7 +25,7 @@ ROWS_AT_A_TIME = 1000
 """Runs that are held in memory as rows while the tables are made."""
 MARK = "study.json"
 PARTS = "parts"
-OURS = (MARK, PARTS, "runs.parquet", "streams.parquet", "tables.md", "capacity.png")
+OURS = (MARK, PARTS, "runs.parquet", "streams.parquet", "tables.md", "capacity.png", "report.html")
 """What a study writes into its folder."""
 
 
@@ -101,15 +101,14 @@ class Store:
 
     def stored(self, spec: RunSpec) -> Part | None:
         """Returns the part of a run, a failed one too, None if it is missing or damaged."""
-        try:
-            content = json.loads(self.part_path(spec).read_text(encoding="utf-8"))
-            if content["sha256"] != _checksum(content["run"], content["streams"]):
-                return None
-            if content["run"]["run_id"] != spec.run_id:
-                return None
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-        return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
+        return _part_in(self.part_path(spec))
+
+    def everything(self) -> Iterator[Part]:
+        """Yields every part that is there and whole, whatever asked for it."""
+        for path in sorted((self.folder / PARTS).glob("*.json")):
+            part = _part_in(path)
+            if part is not None:
+                yield part
 
     def read(self, spec: RunSpec) -> Part | None:
         """Returns the part of a run, None if it is missing or damaged or the run had failed."""
@@ -153,6 +152,19 @@ class Store:
         write_parquet(self.folder / "runs.parquet", runs)
         write_parquet(self.folder / "streams.parquet", streams)
         write_text(self.folder / "tables.md", markdown)
+
+
+def _part_in(path: Path) -> Part | None:
+    """The part in a file, None if it is missing, damaged or of another run than its name says."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["sha256"] != _checksum(content["run"], content["streams"]):
+            return None
+        if content["run"]["run_id"] != path.stem:
+            return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
 
 
 def _checksum(run: Row, streams: list[Row]) -> str:

@@ -1,0 +1,55 @@
+"""One HTML file that works without a network: template, scripts, styles and runs in it."""
+
+import base64
+import gzip
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import jinja2
+
+from coramp.report.page.shown import ShownRun, page_data
+
+LIBRARY = "uplot-1.6.32.min.js"
+STYLES = ("uplot-1.6.32.min.css", "page.css")
+SCRIPTS = ("motion.js", "details.js", "diagram.js", "replay.js", "page.js", "report.js")
+
+
+def assembled(template: str, **values: Any) -> str:
+    """Returns a page from one of the templates, with scripts and styles in it."""
+    page = (
+        _environment()
+        .get_template(template)
+        .render(
+            styles=[asset(name) for name in STYLES],
+            library=asset(LIBRARY),
+            scripts="\n".join(asset(name) for name in SCRIPTS),
+            **values,
+        )
+    )
+    return page + "\n"
+
+
+@cache
+def asset(name: str) -> str:
+    """Returns the text of one of the files that pages are made of."""
+    folder = resources.files("coramp.report.page") / "assets"
+    return (folder / name).read_text(encoding="utf-8")
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("coramp.report.page"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def packed(run: ShownRun) -> str:
+    """Returns a run as the page unpacks it: base64 of gzipped JSON; the same run, the same text."""
+    text = json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

@@ -1,0 +1,49 @@
+// Puts runs into the page: replay, diagrams and details that follow each other.
+coramp.Show = class {
+  constructor(box, runs) {
+    this.box = box;
+    this.runs = runs;
+    box.replaceChildren();
+    const { element } = coramp;
+    const replayBox = element('div');
+    this.details = element('div', { class: 'detail-box', 'aria-live': 'polite' },
+      element('p', { class: 'hint' }, 'Point at a vehicle, or choose one, to see its decision.'));
+    box.append(element('h3', {}, 'Replay'), replayBox,
+      element('h3', {}, 'Time-space diagram'), coramp.legend());
+    this.diagrams = runs.map((run) => {
+      const diagramBox = element('figure', {}, element('figcaption', {}, run.title));
+      box.append(diagramBox);
+      return new coramp.Diagram(run, diagramBox, {
+        onselect: (i) => this.select(run, i),
+        ontime: (time) => { this.replay.pause(); this.replay.seek(time); },
+      });
+    });
+    box.append(this.details);
+    this.replay = new coramp.Replay(runs, replayBox, {
+      ontime: (time) => this.diagrams.forEach((diagram) => diagram.setTime(time)),
+      onselect: (run, i) => this.diagrams[runs.indexOf(run)].select(i),
+    });
+  }
+
+  select(run, i) {
+    this.replay.selected = i === null ? null : run.ids[i];
+    this.replay.draw();
+    const shown = i === null ? [] : this.runs
+      .filter((other) => other.indexOf.has(run.ids[i]))
+      .map((other) => coramp.detailsOf(other, other.indexOf.get(run.ids[i])));
+    this.details.replaceChildren(...shown);
+  }
+};
+
+coramp.legend = () => {
+  const { element } = coramp;
+  const entries = { ramp: 'ramp vehicle, dot: its merge', moved: 'moves for another', mainline: 'mainline vehicle',
+    lane: 'stations of the acceleration lane', bad: 'nearer than the safe distance' };
+  return element('ul', { class: 'legend' }, ...Object.entries(entries).map(([key, text]) =>
+    element('li', {}, element('span', { class: `swatch ${key}`, 'aria-hidden': 'true' }), text)));
+};
+
+coramp.problem = (box, error) => {
+  box.replaceChildren(coramp.element('p', { role: 'alert', class: 'problem' },
+    `This cannot be shown: ${error.message}`));
+};

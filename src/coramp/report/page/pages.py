@@ -1,0 +1,173 @@
+"""The pages of runs: report and replay of one run, or of several on the same arrivals."""
+
+from collections.abc import Sequence
+
+from coramp.errors import CorampError
+from coramp.metrics.tables import Row
+from coramp.report.page.assemble import assembled, packed
+from coramp.report.page.shown import ShownRun
+from coramp.running import broken_promises
+from coramp.studies.tables import Table, number
+
+RUNGS = ("free", "reach", "create", "delay", "hold")
+
+
+def replay_page(runs: Sequence[ShownRun]) -> str:
+    """Returns a page with the replay and the time-space diagrams of runs on the same arrivals.
+
+    Raises CorampError where their arrivals differ.
+    """
+    check_same_arrivals(runs)
+    return assembled("replay.html", **_frame("Replay", runs))
+
+
+def run_page(runs: Sequence[ShownRun], versions: Row, repeat: Sequence[str]) -> str:
+    """Returns the report of the first run; others on the same arrivals stand beside it.
+
+    ``versions`` are those that it was computed with, ``repeat`` the commands that do it again.
+    Raises CorampError where their arrivals differ.
+    """
+    check_same_arrivals(runs)
+    return assembled(
+        "run.html",
+        **_frame("Report", runs),
+        asked=asked_table(runs[0]),
+        answer=" ".join([answer(run) for run in runs] + _difference(runs)),
+        notes=[line for run in runs for line in notes(run)],
+        tables=[comparison_table(runs)],
+        pictures=[],
+        sure=_how_sure(runs),
+        versions=Table("Versions", ("what", "version"), tuple(map(_texts, versions.items()))),
+        repeat="\n".join(repeat),
+    )
+
+
+def check_same_arrivals(runs: Sequence[ShownRun]) -> None:
+    """Raises CorampError where vehicles of the runs do not arrive at the same times."""
+    columns = ["vehicle_id", "scheduled_s"]
+    for run in runs[1:]:
+        if not run.vehicles.select(columns).equals(runs[0].vehicles.select(columns)):
+            one, other = (f"{r.flows}, seed {r.summary['seed']}" for r in (runs[0], run))
+            raise CorampError(
+                f"--against: other vehicles arrive there ({one}; {other}); allowed are runs of the "
+                "same flows, seed and horizon"
+            )
+
+
+def _frame(kind: str, runs: Sequence[ShownRun]) -> Row:
+    first = runs[0]
+    keys = {f"run-{k}": packed(run) for k, run in enumerate(runs)}
+    return {
+        "title": f"{kind}: {' against '.join(run.title for run in runs)}",
+        "subtitle": f"{first.scenario.name}, {first.flows}, seed {first.summary['seed']}, "
+        f"{first.scenario.simulation.horizon_s:g} s of arrivals",
+        "runs": keys,
+        "cells": [{"flow": first.flows, "runs": {key: key for key in keys}}],
+    }
+
+
+def _texts(pair: tuple[str, object]) -> tuple[str, str]:
+    return pair[0], str(pair[1])
+
+
+def asked_table(run: ShownRun) -> Table:
+    """Returns the road, traffic and error budget that were asked about."""
+    scenario = run.scenario
+    mainline, ramp, safety = scenario.mainline, scenario.ramp, scenario.safety
+    rows = (
+        ("scenario", f"{scenario.name}: {scenario.description}".rstrip(": ")),
+        ("mainline", f"{mainline.start_m:g} to {mainline.end_m:g} m, {mainline.speed_mps:g} m/s"),
+        ("ramp", f"{-ramp.start_m:g} m, {ramp.speed_mps:g} m/s, at {ramp.merge_angle_deg:g}°"),
+        ("acceleration lane", f"{ramp.acceleration_lane_m:g} m"),
+        ("flow, mainline + ramp", run.flows),
+        ("arrivals", f"{scenario.simulation.horizon_s:g} s, seed {run.summary['seed']}"),
+        ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
+        ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
+    )
+    return Table("What was computed", ("what", "value"), rows)
+
+
+def _errors(positioning_error_m: float, run: ShownRun) -> str:
+    safety = run.scenario.safety
+    gap = f"; time gap {safety.time_gap_s:g} s" if safety.time_gap_s else ""
+    return f"{positioning_error_m:g} m, {safety.clock_error_s:g} s{gap}"
+
+
+def answer(run: ShownRun) -> str:
+    """Returns in a sentence what the run says."""
+    row = run.summary
+    left = row["unserved"]
+    served = "everyone got through" if not left else f"{left} vehicles did not get through"
+    return (
+        f"With {run.title}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s on "
+        f"the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."
+    )
+
+
+def _difference(runs: Sequence[ShownRun]) -> list[str]:
+    if len(runs) < 2:
+        return []
+    one, other = runs[0].summary, runs[1].summary
+    parts = []
+    for stream in ("mainline", "ramp"):
+        first, second = one[f"{stream}_delay_s"], other[f"{stream}_delay_s"]
+        if first is not None and second is not None:
+            word = "less" if first <= second else "more"
+            parts.append(f"{abs(second - first):.2f} s {word} on the {stream}")
+    return [f"On the same arrivals, {runs[0].title} loses {' and '.join(parts)}."] if parts else []
+
+
+def notes(run: ShownRun) -> list[str]:
+    """Returns what must be said of a run before all else."""
+    row, found = run.summary, []
+    broken = broken_promises(row)
+    if broken:
+        found.append(f"Unsafe, {run.title}: {'; '.join(broken)}.")
+    elif row["safety_violations"]:
+        found.append(
+            f"{run.title}: {row['safety_violations']} pairs came nearer than the safe distance of "
+            "Eq. 1, 15 and 16, which their drivers do not know of; they are ringed below."
+        )
+    return found
+
+
+def comparison_table(runs: Sequence[ShownRun]) -> Table:
+    """Returns the figures of runs side by side."""
+    lines: list[tuple[str, str, int]] = [
+        ("mainline delay, mean (s)", "mainline_delay_s", 2),
+        ("mainline delay, 95th percentile (s)", "mainline_delay_p95_s", 2),
+        ("ramp delay, mean (s)", "ramp_delay_s", 2),
+        ("ramp delay, 95th percentile (s)", "ramp_delay_p95_s", 2),
+        ("mainline speed, mean (m/s)", "mainline_speed_mps", 2),
+        ("ramp speed, mean (m/s)", "ramp_speed_mps", 2),
+        ("fuel (l)", "fuel_l", 2),
+        ("mainline vehicles", "vehicles_mainline", 0),
+        ("ramp vehicles", "vehicles_ramp", 0),
+        ("not served", "unserved", 0),
+        ("collisions", "collisions", 0),
+        ("pairs nearer than the safe distance", "safety_violations", 0),
+        ("smallest margin over Eq. 1 (m)", "min_margin_m", 3),
+        ("smallest time to collision (s)", "min_ttc_s", 2),
+        ("hardest braking (m/s²)", "max_decel_mps2", 2),
+        ("largest difference between plan and SUMO (m)", "plan_error_m", 4),
+        *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
+    ]
+    rows = tuple(
+        (text, *(number(run.summary[key], digits) for run in runs))
+        for text, key, digits in lines
+        if any(run.summary[key] is not None for run in runs)
+    )
+    return Table("Figures", ("what", *(run.title for run in runs)), rows)
+
+
+def _how_sure(runs: Sequence[ShownRun]) -> list[str]:
+    return [
+        (
+            f"This is one seed ({runs[0].summary['seed']}), one draw of arrivals and entry speeds: "
+            "it has no interval. A study of several seeds gives one (coramp study)."
+        ),
+        (
+            "Within the run the figures are exact for what was driven: delays, fuel and margins "
+            "come from pieces of constant acceleration in closed form."
+        ),
+    ]

@@ -1,0 +1,191 @@
+"""A run as a page shows it: plain data of where everyone is, and why."""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from coramp.arrivals import arrivals_of
+from coramp.engines.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
+from coramp.errors import CorampError
+from coramp.explanation import quantities
+from coramp.metrics.tables import Row
+from coramp.report.style import look_of
+from coramp.scenario import Scenario
+from coramp.story import told
+
+PIECE_COLUMNS = ("time_s", "station_m", "speed_mps", "accel_mps2")
+DIGITS = (4, 4, 6, 7)
+"""Of the columns of pieces: after a minute still within a millimetre of the records."""
+
+
+@dataclass(frozen=True)
+class ShownRun:
+    """The records of one run, whether just made or read from a folder.
+
+    ``motion`` are trajectories of a cooperative run and positions of any other.
+    """
+
+    scenario: Scenario
+    summary: Row
+    vehicles: pl.DataFrame
+    speeds: pl.DataFrame
+    motion: pl.DataFrame
+    decisions: pl.DataFrame | None
+    violations: pl.DataFrame | None
+
+    @property
+    def title(self) -> str:
+        """What the run is called beside others on the same arrivals."""
+        return look_of(self.summary["strategy"], self.summary["drivers"]).label
+
+    @property
+    def flows(self) -> str:
+        """The flows in words."""
+        return f"{self.summary['mainline_veh_h']:g} + {self.summary['ramp_veh_h']:g} veh/h"
+
+
+def shown_run(records: Any) -> ShownRun:
+    """Returns a run as it is shown, from a ``StoredRun`` or a ``RunResult``.
+
+    Raises CorampError where there are no positions, as in runs of a coramp that kept none.
+    """
+    motion = records.trajectories if records.trajectories is not None else records.positions
+    if motion is None:
+        raise CorampError(
+            "the run tells nothing of where vehicles were: an older coramp wrote it; run it again"
+        )
+    content = records.content
+    scenario = Scenario.model_validate(content["specification"], strict=False)
+    return ShownRun(
+        scenario,
+        content["summary"],
+        records.vehicles,
+        records.speeds,
+        motion,
+        records.decisions,
+        records.violations,
+    )
+
+
+def page_data(run: ShownRun) -> Row:
+    """Returns what the page's scripts take for one run; times in s, lengths in m.
+
+    ``pieces`` are rows of time, station, speed and acceleration, one after the other; those of
+    vehicle i are ``first[i]`` to ``first[i + 1]``. Vehicles are named by their place in ``ids``.
+    """
+    ids = run.vehicles["vehicle_id"].to_list()
+    place_of = {name: place for place, name in enumerate(ids)}
+    first, pieces, merge_s = _pieces(run, place_of)
+    templates: dict[tuple[str, str, str], int] = {}
+    decisions = [_decision(row, run, place_of, templates) for row in _rows(run.decisions)]
+    exits_s = run.vehicles["exit_s"].to_list()
+    last_s = max([exit_s for exit_s in exits_s if exit_s is not None], default=0.0)
+    simulation = run.scenario.simulation
+    capped = any(exit_s is None for exit_s in exits_s)
+    return {
+        "title": run.title,
+        "strategy": run.summary["strategy"],
+        "drivers": run.summary["drivers"],
+        "seed": run.summary["seed"],
+        "end_s": simulation.horizon_s + simulation.drain_s if capped else last_s,
+        "road": road_data(run.scenario),
+        "safety": run.scenario.safety.model_dump(mode="json"),
+        "ids": ids,
+        "on_ramp": [int(stream == "ramp") for stream in run.vehicles["stream"].to_list()],
+        "length": _lengths_m(run, ids),
+        "scheduled": _rounded(run.vehicles["scheduled_s"].to_list()),
+        "exit": _rounded(exits_s),
+        "merge": _rounded(merge_s),
+        "first": first,
+        "pieces": pieces,
+        "decisions": decisions,
+        "templates": [list(template) for template in templates],
+        "violations": [
+            {
+                "time": round(row["time_s"], 3),
+                "front": place_of[row["front_vehicle_id"]],
+                "rear": place_of[row["rear_vehicle_id"]],
+                "margin": row["margin_m"],
+            }
+            for row in _rows(run.violations)
+        ],
+    }
+
+
+def road_data(scenario: Scenario) -> Row:
+    """Returns the road's shape, as it is built in SUMO; lengths in m, the angle in degrees."""
+    _, (bend_m, _), _ = ramp_shape_m(road_plan(scenario))
+    return {
+        "start_m": scenario.mainline.start_m,
+        "end_m": scenario.mainline.end_m,
+        "ramp_start_m": scenario.ramp.start_m,
+        "beside_m": -bend_m,
+        "lane_m": scenario.ramp.acceleration_lane_m,
+        "lane_width_m": LANE_WIDTH_M,
+        "merge_angle_deg": scenario.ramp.merge_angle_deg,
+        "decision_m": scenario.ramp.decision_station_m,
+        "v0_mps": scenario.mainline.speed_mps,
+    }
+
+
+def _rows(frame: pl.DataFrame | None) -> Iterator[Row]:
+    return iter(()) if frame is None else frame.iter_rows(named=True)
+
+
+def _rounded(values: Iterable[float | None]) -> list[float | None]:
+    return [None if value is None else round(value, 3) for value in values]
+
+
+def _pieces(
+    run: ShownRun, place_of: dict[str, int]
+) -> tuple[list[int], list[float], list[float | None]]:
+    """First piece of each vehicle, all pieces, and when each ramp vehicle changed lane."""
+    place = run.motion["vehicle_id"].replace_strict(place_of, return_dtype=pl.Int64).to_numpy()
+    order = np.argsort(place, kind="stable")
+    first = np.searchsorted(place[order], np.arange(len(place_of) + 1))
+    columns = [
+        np.round(run.motion[name].to_numpy()[order], digits)
+        for name, digits in zip(PIECE_COLUMNS, DIGITS, strict=True)
+    ]
+    merge_s: list[float | None] = [None] * len(place_of)
+    changed = run.motion.filter(pl.col("lane") == "mainline").group_by("vehicle_id")
+    for name, time_s in changed.agg(pl.col("time_s").min()).iter_rows():
+        merge_s[place_of[name]] = time_s
+    return first.tolist(), np.column_stack(columns).ravel().tolist(), merge_s
+
+
+def _lengths_m(run: ShownRun, ids: list[str]) -> list[float]:
+    arrivals = arrivals_of(run.scenario, run.summary["seed"])
+    known = {arrival.vehicle_id: arrival.length_m for arrival in arrivals}
+    return [known.get(name, run.scenario.vehicle.length_m) for name in ids]
+
+
+def _decision(
+    row: Row,
+    run: ShownRun,
+    place_of: dict[str, int],
+    templates: dict[tuple[str, str, str], int],
+) -> Row:
+    found = []
+    for quantity in quantities(row, run.scenario):
+        key = (quantity.equation, quantity.symbol, quantity.meaning)
+        found.append([templates.setdefault(key, len(templates)), quantity.text()])
+    return {
+        "time": round(row["time_s"], 3),
+        "vehicle": place_of[row["vehicle_id"]],
+        "rung": row["rung"],
+        "told": told(row),
+        "adjusted": [place_of[name] for name in row["adjusted_vehicle_ids"] or []],
+        "merge_time": _finite(row["merge_time_s"]),
+        "merge_station": _finite(row["merge_station_m"]),
+        "required_gap": _finite(row["required_gap_m"]),
+        "quantities": found,
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(value, 4)

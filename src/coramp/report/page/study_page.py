@@ -1,0 +1,241 @@
+"""The report of a study: its answer, its tables and pictures, and what it does not know."""
+
+import base64
+import io
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import polars as pl
+from matplotlib.figure import Figure
+
+from coramp.errors import CorampError
+from coramp.files import read_json
+from coramp.metrics.schemas import RESULT_VERSION
+from coramp.metrics.tables import Row
+from coramp.report.capacity_figure import capacity_figure
+from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
+from coramp.report.page.assemble import assembled, packed
+from coramp.report.page.pages import check_same_arrivals
+from coramp.report.page.shown import ShownRun, shown_run
+from coramp.report.sensitivity_figure import sensitivity_figure
+from coramp.report.style import UNDATED, look_of
+from coramp.run_folder import StoredRun, check_version, run_content
+from coramp.running import execute, make_spec
+from coramp.studies.definition import Study, count_runs
+from coramp.studies.statistics import estimate
+from coramp.studies.store import MARK, Store
+from coramp.studies.summary import promises, summary_tables
+from coramp.studies.tables import Table, with_interval
+
+SHOWN_DRIVERS = ("fair", "paper")
+DRAWN = {
+    "paper": (
+        ("Mean delay by flow, with 95 % intervals over seeds", delay_figure),
+        ("Delay saved against the paper's drivers and against fair ones", gain_figure),
+        ("Which rung gave each merge, by flow", rung_figure),
+    ),
+    "sensitivity": (("Delay by setting", sensitivity_figure),),
+    "capacity": (("Where each strategy breaks down", capacity_figure),),
+}
+
+
+def study_page(folder: Path, say: Callable[[str], None]) -> str:
+    """Returns the report of a study, of as many of its runs as are done.
+
+    The lowest and the highest flow that all strategies share are run once more, with the first
+    seed, as studies keep no positions; ``say`` is told of each. Raises CorampError where there is
+    no study, or none of its runs went well.
+    """
+    content = _content(folder)
+    study = Study.model_validate(content["study"], strict=False)
+    runs = _runs(folder, study)
+    good = runs.filter(status="ok")
+    if good.is_empty():
+        reason = f": {runs['error'][0]}" if runs.height else ""
+        raise CorampError(f"{folder}: no run went well{reason}; start its coramp study again")
+    cells, packs = _cells(study, good, say)
+    return assembled(
+        "study.html",
+        title=f"Report: study {study.name}",
+        subtitle=study.description,
+        asked=_asked(study, good),
+        answer=_answer(good),
+        notes=list(_notes(study, runs)),
+        tables=summary_tables(study, runs),
+        pictures=[_picture(text, draw(good)) for text, draw in DRAWN.get(study.layout, ())],
+        failed=_failed(runs),
+        sure=_how_sure(good),
+        versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
+        repeat=f"coramp study {study.name} --seeds {good['seed'].n_unique()}",
+        runs=packs,
+        cells=cells,
+    )
+
+
+def _content(folder: Path) -> Row:
+    content = read_json(folder / MARK)
+    if not isinstance(content, dict) or content.get("kind") != "study":
+        raise CorampError(f"{folder / MARK}: does not describe a study; give another folder")
+    check_version(folder, content)
+    if content.get("result_version") != RESULT_VERSION:
+        raise CorampError(
+            f"{folder}: was written by an older coramp; run its study again in another folder"
+        )
+    return content
+
+
+def _runs(folder: Path, study: Study) -> pl.DataFrame:
+    path = folder / "runs.parquet"
+    if not path.exists():
+        store = Store(folder, study)
+        return store.frames(store.everything())[0]
+    try:
+        return pl.read_parquet(path)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
+
+
+def _asked(study: Study, good: pl.DataFrame) -> Table:
+    flows = good.select("mainline_veh_h", "ramp_veh_h").unique().sort(pl.all())
+    pairs = [f"{mainline:g} + {ramp:g}" for mainline, ramp in flows.iter_rows()]
+    shown = ", ".join(pairs) if len(pairs) <= 12 else f"{pairs[0]} to {pairs[-1]} ({len(pairs)})"
+    rows = (
+        ("study", f"{study.name}: {study.description}".rstrip(": ")),
+        ("scenario", study.scenario),
+        ("strategies", ", ".join(good["strategy"].unique(maintain_order=True))),
+        ("flows, mainline + ramp (veh/h)", shown),
+        ("seeds", str(good["seed"].n_unique())),
+        ("runs", str(good.height)),
+    )
+    return Table("What was computed", ("what", "value"), rows)
+
+
+def _answer(good: pl.DataFrame) -> str:
+    """What each strategy loses at the highest flow that all share, in a sentence."""
+    mainline, ramp = _shared_flows(good)[-1]
+    at = _plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
+    parts = []
+    for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
+        delays = [
+            with_interval(estimate(group[f"{stream}_delay_s"].drop_nulls().to_list()))
+            for stream in ("mainline", "ramp")
+        ]
+        name = look_of(str(strategy), str(drivers) if drivers else None).label
+        parts.append(f"{name} loses {delays[0]} s on the mainline and {delays[1]} s on the ramp")
+    return f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals: {'; '.join(parts)}."
+
+
+def _plain(good: pl.DataFrame) -> pl.DataFrame:
+    plain = good.filter(pl.col("overrides").is_null())
+    return plain if plain.height else good
+
+
+def _shared_flows(good: pl.DataFrame) -> list[tuple[float, float]]:
+    """The flows at which there are most strategies, by their sum."""
+    who = pl.struct("strategy", "drivers").n_unique().alias("who")
+    counted = _plain(good).group_by("mainline_veh_h", "ramp_veh_h").agg(who)
+    most = counted.filter(pl.col("who") == pl.col("who").max())
+    return sorted(most.select("mainline_veh_h", "ramp_veh_h").rows(), key=sum)
+
+
+def _notes(study: Study, runs: pl.DataFrame) -> Iterator[str]:
+    seeds = int(runs["seed"].max())  # type: ignore[arg-type]
+    asked = count_runs(study, seeds)
+    if runs.height < asked:
+        most = "at most " if study.searches else ""
+        yield f"{runs.height} of {most}{asked} runs with {seeds} seeds are done and reported here."
+    failed = runs.filter(status="failed").height
+    if failed:
+        yield f"{failed} of {runs.height} runs failed; they are listed below and count nowhere."
+
+
+def _failed(runs: pl.DataFrame) -> Table | None:
+    failed = runs.filter(status="failed")
+    if failed.is_empty():
+        return None
+    columns = ("strategy", "drivers", "mainline_veh_h", "ramp_veh_h", "seed", "overrides", "error")
+    rows = tuple(tuple(map(_cell, row)) for row in failed.select(columns).iter_rows())
+    return Table("Failed runs", columns, rows)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "-"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _how_sure(good: pl.DataFrame) -> list[str]:
+    kept = promises(good)
+    seeds = good["seed"].n_unique()
+    alone = " One seed has none; run more (--seeds 10)." if seeds == 1 else ""
+    return [
+        (
+            f"Means are over {seeds} seeds, each one draw of arrivals and entry speeds, the same "
+            f"for every strategy; ± is a 95 % interval of the mean by Student's t.{alone}"
+        ),
+        "What the cooperative runs promised: "
+        + "; ".join(f"{what}: {value}" for what, value in kept.rows)
+        + ".",
+    ]
+
+
+def _picture(text: str, figure: Figure) -> Row:
+    content = io.BytesIO()
+    figure.savefig(content, format="svg", metadata=UNDATED["svg"])
+    return {"text": text, "svg": base64.b64encode(content.getvalue()).decode("ascii")}
+
+
+def _cells(
+    study: Study, good: pl.DataFrame, say: Callable[[str], None]
+) -> tuple[list[Row], dict[str, str]]:
+    """The runs to be watched, by flow and by title, and each packed under its key."""
+    flows = _shared_flows(good)
+    cells: list[Row] = []
+    packs: dict[str, str] = {}
+    for mainline, ramp in dict.fromkeys((flows[0], flows[-1])):
+        found: dict[str, str] = {}
+        for run in _shown(study, good, (mainline, ramp), say):
+            key = f"run-{len(packs)}"
+            packs[key], found[run.title] = packed(run), key
+        cells.append({"flow": f"{mainline:g} + {ramp:g} veh/h", "runs": found})
+    return cells, packs
+
+
+def _shown(
+    study: Study, good: pl.DataFrame, flows: tuple[float, float], say: Callable[[str], None]
+) -> list[ShownRun]:
+    at = _plain(good).filter(mainline_veh_h=flows[0], ramp_veh_h=flows[1])
+    at = at.filter(pl.col("seed") == pl.col("seed").min())
+    shown: list[ShownRun] = []
+    for row in at.unique(["strategy", "drivers"], maintain_order=True).iter_rows(named=True):
+        if row["overrides"] is not None or row["drivers"] not in (None, *SHOWN_DRIVERS):
+            continue
+        say(f"running {row['strategy']} at {flows[0]:g} + {flows[1]:g} veh/h, to show it")
+        shown.append(_again(study, row))
+    check_same_arrivals(shown)
+    return shown
+
+
+def _again(study: Study, row: Row) -> ShownRun:
+    """A run of the study once more; cooperative ones need no simulator."""
+    spec = make_spec(
+        study.scenario,
+        row["strategy"],
+        engine="sumo" if row["drivers"] else "exact",
+        mainline_veh_h=row["mainline_veh_h"],
+        ramp_veh_h=row["ramp_veh_h"],
+        drivers=row["drivers"],
+        seed=row["seed"],
+        horizon_s=study.horizon_s,
+    )
+    tables, summary = execute(spec)
+    stored = StoredRun(
+        run_content(spec, summary),
+        tables.vehicles,
+        tables.speeds,
+        tables.trajectories,
+        tables.decisions,
+        tables.positions,
+        tables.violations,
+    )
+    return shown_run(stored)
