@@ -1,4 +1,4 @@
-# make demo | test | lint | bench | clean; everything lives in .venv of this checkout.
+# make demo | test | lint | bench | docs | clean; everything lives in .venv of this checkout.
 SHELL := /bin/sh
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,13 +9,14 @@ USABLE := import ensurepip, sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
 	$$p -c '$(USABLE)' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help demo test lint bench clean
+.PHONY: help demo test lint bench docs clean
 
 help:
-	@echo "make demo   install, run the paper's study with three seeds, print its tables"
+	@echo "make demo   install, run the paper's study with three seeds, print its tables, write its report"
 	@echo "make test   run all tests"
 	@echo "make lint   check style, types and layers"
 	@echo "make bench  measure speed, as ratios"
+	@echo "make docs   build the docs site into out/site"
 	@echo "make clean  remove the environment and all results under out/"
 
 $(INSTALLED): pyproject.toml constraints.txt
@@ -30,6 +31,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 
 demo: $(INSTALLED)
 	$(BIN)/coramp study paper --out out/demo
+	$(BIN)/coramp report out/demo
 
 test: $(INSTALLED)
 	$(BIN)/pytest -n auto --dist loadfile
@@ -42,6 +44,10 @@ lint: $(INSTALLED)
 
 bench: $(INSTALLED)
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds --benchmark-sort=fullname -s
+
+docs: $(INSTALLED)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "Written: out/site/index.html"
 
 clean:
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
