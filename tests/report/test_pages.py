@@ -1,0 +1,211 @@
+"""Reports and replays in a real headless Chromium."""
+
+import json
+import os
+import shutil
+from contextlib import contextmanager
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import sync_playwright
+
+import coramp
+from coramp.core.trajectory import station_and_speed
+from coramp.errors import CorampError
+from coramp.metrics.schemas import RESULT_VERSION
+from coramp.report.plan_figure import pieces_of_each
+from coramp.reporting import replay, report
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+TRAFFIC = {"mainline_veh_h": 1800.0, "ramp_veh_h": 500.0, "seed": 77, "horizon_s": 120.0}
+STUDY = """
+name = "small"
+scenario = "paper"
+layout = "paper"
+horizon_s = 60.0
+[[runs]]
+strategies = ["mainline-priority", "ramp-priority"]
+flows_veh_h = [[800, 200], [1800, 500]]
+engine = "exact"
+"""
+
+in_browser = pytest.mark.skipif(
+    CHROMIUM is None and os.environ.get("CI") != "true",
+    reason="needs chromium (apt-get install chromium)",
+)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    root = tmp_path_factory.mktemp("runs")
+    for name in ("mainline-priority", "ramp-priority"):
+        coramp.run("paper", name, engine="exact", out=root / name, **TRAFFIC)
+    coramp.run("paper", "uncontrolled", out=root / "uncontrolled", **TRAFFIC)
+    (root / "s.toml").write_text(STUDY)
+    coramp.study(str(root / "s.toml"), seeds=2, jobs=1, out=root / "study")
+    return root
+
+
+@pytest.fixture(scope="module")
+def browser():
+    assert CHROMIUM is not None, "there is no chromium; apt-get install chromium"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser, path, width=1100, **options):
+    """The page, once its runs are shown; asks for nothing and complains of nothing."""
+    context = browser.new_context(viewport={"width": width, "height": 900}, **options)
+    page = context.new_page()
+    requests, complaints = [], []
+    page.on("request", lambda request: requests.append(request.url))
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(path.as_uri())
+    page.evaluate("coramp.ready")
+    yield page
+    assert requests == [path.as_uri()]
+    assert complaints == []
+    context.close()
+
+
+@in_browser
+def test_scrubbing_puts_vehicles_where_the_records_say(browser, folders):
+    path = report(folders / "mainline-priority", folders / "uncontrolled")
+    records = coramp.run("paper", engine="exact", **TRAFFIC)
+    pieces = {name: rows for name, rows, _ in pieces_of_each(records.trajectories)}
+    with opened(browser, path) as page:
+        for time_s in (31.0, 55.5, 90.2):
+            page.locator("input[type=range]").fill(str(time_s))
+            seen = page.evaluate("coramp.shown.replay.positions(0)")
+            there = records.vehicles.filter(
+                (records.vehicles["entry_s"] <= time_s) & (records.vehicles["exit_s"] >= time_s)
+            )["vehicle_id"]
+            assert sorted(vehicle["id"] for vehicle in seen) == sorted(there)
+            left_m, scale = page.evaluate(
+                "(() => { const road = coramp.shown.replay.panels[0].road;"
+                " return [road.left, road.scale / road.ratio]; })()"
+            )
+            for vehicle in seen:
+                station_m = station_and_speed(pieces[vehicle["id"]], time_s)[0]
+                assert vehicle["station"] == pytest.approx(station_m, abs=2e-3)
+                if station_m > 0.0:
+                    assert vehicle["px"] == pytest.approx((station_m - left_m) * scale, abs=1.0)
+
+
+@in_browser
+def test_playing_moves_vehicles(browser, folders):
+    path = replay(folders / "mainline-priority", folders / "ramp-priority")
+    with opened(browser, path) as page:
+        before = page.evaluate("coramp.shown.replay.time")
+        page.get_by_role("button", name="play").click()
+        page.wait_for_function(f"coramp.shown.replay.time > {before} + 0.5")
+        page.get_by_role("button", name="pause").click()
+        stopped = page.evaluate("coramp.shown.replay.time")
+        page.wait_for_timeout(100)
+        assert page.evaluate("coramp.shown.replay.time") == stopped
+
+
+@in_browser
+def test_hovering_shows_the_decision_with_its_equations(browser, folders):
+    path = report(folders / "mainline-priority")
+    with opened(browser, path) as page:
+        place = page.evaluate(
+            "(() => { const d = coramp.shown.diagrams[0], run = d.run;"
+            " const i = run.everyone.find((i) => run.decisionsOf.has(i) && run.merge[i] !== null);"
+            " d.show([0, 90], d.full.y); d.plot.over.scrollIntoView({block: 'center'});"
+            " const box = d.plot.over.getBoundingClientRect(), time = run.merge[i] - 8;"
+            " return {id: run.ids[i], told: run.decisionsOf.get(i).at(-1).told,"
+            " x: box.left + d.plot.valToPos(time, 'x'),"
+            " y: box.top + d.plot.valToPos(coramp.state(run, i, time).station, 'y')}; })()"
+        )
+        page.mouse.move(place["x"], place["y"])
+        tip = page.locator(".tip")
+        tip.wait_for(state="visible")
+        text = tip.inner_text()
+        assert place["id"] in text
+        assert place["told"] in text
+        assert "Eq. 31: a_r' =" in text
+        page.mouse.click(place["x"], place["y"])
+        details = page.locator(".details").inner_text()
+        for equation in ("Eq. 1", "Eq. 17", "Eq. 24", "Eq. 33"):
+            assert equation in details
+
+
+@in_browser
+def test_the_keyboard_reaches_a_vehicles_decision(browser, folders):
+    path = report(folders / "mainline-priority")
+    with opened(browser, path) as page:
+        page.locator(".plot").focus()
+        page.keyboard.press("n")
+        assert "r00001" in page.locator(".details h4").inner_text()
+        page.locator(".replay").focus()
+        before = page.evaluate("coramp.shown.replay.time")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("coramp.shown.replay.time") == pytest.approx(before + 1.0)
+
+
+@in_browser
+@pytest.mark.parametrize("colours", ["light", "dark"])
+@pytest.mark.parametrize("width", [375, 1100])
+def test_pages_are_for_everyone(browser, folders, colours, width):
+    for path in (report(folders / "study"), replay(folders / "uncontrolled")):
+        with opened(browser, path, width, color_scheme=colours) as page:
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            found = Axe().run(page).response["violations"]
+            assert [v["id"] for v in found if v["impact"] in ("serious", "critical")] == []
+
+
+@in_browser
+def test_a_study_shows_strategy_against_strategy(browser, folders):
+    with opened(browser, report(folders / "study")) as page:
+        assert page.locator("#show canvas[role=img]").count() == 2
+        page.locator("[data-chooses=second]").select_option("nothing")
+        page.evaluate("coramp.ready")
+        assert page.locator("#show canvas[role=img]").count() == 1
+
+
+def test_a_report_names_its_numbers(folders):
+    text = report(folders / "mainline-priority").read_text()
+    summary = json.loads((folders / "mainline-priority" / "run.json").read_text())["summary"]
+    assert f"{summary['mainline_delay_s']:.2f} s on the mainline" in " ".join(text.split())
+    assert "--seed 77 --horizon 120" in text
+
+
+def test_a_half_done_study_says_how_much(folders, tmp_path):
+    half = shutil.copytree(folders / "study", tmp_path / "half")
+    (half / "runs.parquet").unlink()
+    min((half / "parts").iterdir()).unlink()
+    assert "7 of 8 runs with 2 seeds are done" in report(half).read_text()
+
+
+def test_failed_runs_are_listed(folders, tmp_path):
+    import polars as pl
+
+    broken = shutil.copytree(folders / "study", tmp_path / "broken")
+    runs = pl.read_parquet(broken / "runs.parquet").with_row_index()
+    first = pl.col("index") == 0
+    runs.with_columns(
+        status=pl.when(first).then(pl.lit("failed")).otherwise("status"),
+        error=pl.when(first).then(pl.lit("SUMO: went away")).otherwise("error"),
+    ).drop("index").write_parquet(broken / "runs.parquet")
+    text = report(broken).read_text()
+    assert "1 of 8 runs failed" in text
+    assert "SUMO: went away" in text
+
+
+def test_an_empty_folder_a_newer_format_and_other_arrivals_are_refused(folders, tmp_path):
+    with pytest.raises(CorampError, match="holds no run and no study"):
+        report(tmp_path)
+    newer = shutil.copytree(folders / "ramp-priority", tmp_path / "newer")
+    content = json.loads((newer / "run.json").read_text())
+    (newer / "run.json").write_text(json.dumps({**content, "result_version": RESULT_VERSION + 1}))
+    with pytest.raises(CorampError, match="by a newer coramp"):
+        report(newer)
+    other = {**TRAFFIC, "seed": 78}
+    coramp.run("paper", engine="exact", out=tmp_path / "other", **other)
+    with pytest.raises(CorampError, match="other vehicles arrive there"):
+        replay(folders / "mainline-priority", tmp_path / "other")
