@@ -263,4 +263,5 @@ def _grouped(elements: list[str]) -> str:
 
 def _operator(sign: str) -> str:
     still = ' stretchy="false"' if sign in "()[]{}|" else ""
-    return f"<mo{still}>{escape(sign)}</mo>"
+    close = ' lspace="0" rspace="0"' if sign in "|/" else ""
+    return f"<mo{still}{close}>{escape(sign)}</mo>"
