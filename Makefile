@@ -45,10 +45,11 @@ lint: $(INSTALLED)
 bench: $(INSTALLED)
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds --benchmark-sort=fullname -s
 
+# The variable silences a notice of the theme about its own future; warnings about the docs stay.
 docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "Written: out/site/index.html"
 
 clean:
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks
-	find src tests benchmarks -name __pycache__ -type d -exec rm -rf {} +
+	find src tests benchmarks docs -name __pycache__ -type d -exec rm -rf {} +
