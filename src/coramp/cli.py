@@ -269,6 +269,19 @@ def replay(
     written(write_replay(folder, against))
 
 
+@app.command(epilog="Example: coramp studio my-ramp.toml --port 8650 --open")
+def studio(
+    scenario: Annotated[str, typer.Argument(help="A built-in scenario or a TOML file.")] = "paper",
+    port: Annotated[int, typer.Option(help="Port on this machine; 0 takes any.")] = 8642,
+    show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+) -> None:
+    """Play with a scenario: a local page with sliders whose picture follows at once."""
+    from coramp.console import serving
+    from coramp.studio.server import serve
+
+    serve(scenario, port, lambda address: serving(address, show))
+
+
 @app.command(epilog="Example: coramp figures --seeds 10 --study out/capacity --out out/figures")
 def figures(
     out: Annotated[

@@ -319,6 +319,15 @@ def written(path: Path) -> None:
     print(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB); open it in a browser.")
 
 
+def serving(address: str, show: bool) -> None:
+    """Prints where the studio's page lies, and opens it where that is asked for."""
+    print(f"Studio: {address} (ctrl-c ends it)", flush=True)
+    if show:
+        import webbrowser
+
+        webbrowser.open(address)
+
+
 class StudyProgress:
     """A bar with rate and remaining time, or a line now and then where there is no terminal."""
 

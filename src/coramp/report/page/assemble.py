@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -13,18 +14,22 @@ from coramp.report.page.shown import ShownRun, page_data
 
 LIBRARY = "uplot-1.6.32.min.js"
 STYLES = ("uplot-1.6.32.min.css", "page.css")
-SCRIPTS = ("motion.js", "details.js", "diagram.js", "replay.js", "page.js", "report.js")
+SCRIPTS = ("motion.js", "details.js", "diagram.js", "replay.js", "page.js")
+REPORT_SCRIPTS = ("report.js",)
 
 
-def assembled(template: str, **values: Any) -> str:
-    """Returns a page from one of the templates, with scripts and styles in it."""
+def assembled(template: str, own: Sequence[str] = REPORT_SCRIPTS, **values: Any) -> str:
+    """Returns a page from one of the templates, with scripts and styles in it.
+
+    ``own`` are the scripts that it has beside those of every page.
+    """
     page = (
         _environment()
         .get_template(template)
         .render(
             styles=[asset(name) for name in STYLES],
             library=asset(LIBRARY),
-            scripts="\n".join(asset(name) for name in SCRIPTS),
+            scripts="\n".join(asset(name) for name in (*SCRIPTS, *own)),
             **values,
         )
     )

@@ -14,6 +14,7 @@ from coramp.errors import CorampError
 from coramp.explanation import quantities
 from coramp.metrics.tables import Row
 from coramp.report.style import look_of
+from coramp.running import RunSpec, execute
 from coramp.scenario import Scenario
 from coramp.story import told
 
@@ -68,6 +69,23 @@ def shown_run(records: Any) -> ShownRun:
         motion,
         records.decisions,
         records.violations,
+    )
+
+
+def played(spec: RunSpec) -> ShownRun:
+    """Returns a run, made now, as it is shown; raises CorampError where it fails."""
+    tables, summary = execute(spec)
+    motion = tables.trajectories if tables.trajectories is not None else tables.positions
+    if motion is None:
+        raise CorampError("the run tells nothing of where vehicles were")
+    return ShownRun(
+        spec.scenario,
+        summary,
+        tables.vehicles,
+        tables.speeds,
+        motion,
+        tables.decisions,
+        tables.violations,
     )
 
 

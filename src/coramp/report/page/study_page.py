@@ -16,11 +16,11 @@ from coramp.report.capacity_figure import capacity_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.pages import check_same_arrivals
-from coramp.report.page.shown import ShownRun, shown_run
+from coramp.report.page.shown import ShownRun, played
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.style import UNDATED, look_of
-from coramp.run_folder import StoredRun, check_version, run_content
-from coramp.running import execute, make_spec
+from coramp.run_folder import check_version
+from coramp.running import make_spec
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.statistics import estimate
 from coramp.studies.store import MARK, Store
@@ -228,14 +228,4 @@ def _again(study: Study, row: Row) -> ShownRun:
         seed=row["seed"],
         horizon_s=study.horizon_s,
     )
-    tables, summary = execute(spec)
-    stored = StoredRun(
-        run_content(spec, summary),
-        tables.vehicles,
-        tables.speeds,
-        tables.trajectories,
-        tables.decisions,
-        tables.positions,
-        tables.violations,
-    )
-    return shown_run(stored)
+    return played(spec)

@@ -1,6 +1,6 @@
 // Puts runs into the page: replay, diagrams and details that follow each other.
 coramp.Show = class {
-  constructor(box, runs) {
+  constructor(box, runs, before = null) {
     this.box = box;
     this.runs = runs;
     box.replaceChildren();
@@ -22,7 +22,22 @@ coramp.Show = class {
     this.replay = new coramp.Replay(runs, replayBox, {
       ontime: (time) => this.diagrams.forEach((diagram) => diagram.setTime(time)),
       onselect: (run, i) => this.diagrams[runs.indexOf(run)].select(i),
+    }, before?.replay ?? null);
+    this.diagrams.forEach((diagram) => {
+      const { x, y } = before?.window ?? {};
+      if (before) diagram.show([x[0], Math.min(x[1], diagram.full.x[1])], y);
     });
+  }
+
+  // How it is looked at, so that other runs can be looked at in the same way.
+  state() {
+    const { x, y } = this.diagrams[0].plot.scales;
+    const { full } = this.diagrams[0];
+    const whole = x.min <= full.x[0] && x.max >= full.x[1];
+    return {
+      window: { x: [x.min, whole ? Infinity : x.max], y: [y.min, y.max] },
+      replay: this.replay.state(),
+    };
   }
 
   select(run, i) {

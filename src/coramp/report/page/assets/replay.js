@@ -167,7 +167,7 @@ coramp.Road = class {
 coramp.Replay = class {
   static SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
 
-  constructor(runs, box, { ontime = () => {}, onselect = () => {} } = {}) {
+  constructor(runs, box, { ontime = () => {}, onselect = () => {} } = {}, before = null) {
     this.box = box;
     this.ontime = ontime;
     this.onselect = onselect;
@@ -178,7 +178,24 @@ coramp.Replay = class {
     this.playing = false;
     this.frames = 0;
     this.build();
-    this.seek(this.firstTime());
+    if (before) this.restore(before); else this.seek(this.firstTime());
+  }
+
+  state() {
+    return { time: this.time, playing: this.playing, selected: this.selected, speed: this.speeds.value,
+      view: this.views.value, zoom: this.zooms.value, distances: this.distances.checked };
+  }
+
+  restore(before) {
+    this.selected = before.selected;
+    this.speeds.value = before.speed;
+    this.speed = Number(before.speed);
+    this.views.value = before.view;
+    this.zooms.value = before.zoom;
+    this.distances.checked = before.distances;
+    this.look();
+    this.seek(before.time);
+    if (before.playing) this.play();
   }
 
   firstTime() {

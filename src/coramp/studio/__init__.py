@@ -1,0 +1,1 @@
+"""The studio: a local page whose sliders set a scenario that is computed on the fly."""

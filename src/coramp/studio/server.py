@@ -1,0 +1,116 @@
+"""The studio's server: this machine only, three addresses, nothing kept."""
+
+import errno
+import sys
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, ClassVar
+from urllib.parse import parse_qsl, urlsplit
+
+from coramp.errors import CorampError
+from coramp.studio.answers import Answers
+from coramp.studio.dials import studio_of
+
+HOST = "127.0.0.1"
+HTML, JSON, TOML = "text/html", "application/json", "application/toml"
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+class StudioServer(ThreadingHTTPServer):
+    """Serves one studio on this machine; ``address`` is where its page lies."""
+
+    daemon_threads = True
+
+    def __init__(self, scenario: str, port: int) -> None:
+        """Takes the port, 0 for any that is free; raises CorampError where it cannot."""
+        if not 0 <= port <= 65535:
+            raise CorampError(f"--port: {port} is out of range; allowed is 0 (any) to 65535")
+        self.answers = Answers(studio_of(scenario))
+        try:
+            super().__init__((HOST, port), _Handler)
+        except OSError as error:
+            in_use = error.errno == errno.EADDRINUSE
+            reason = "is in use" if in_use else f"cannot be taken ({error.strerror})"
+            raise CorampError(
+                f"--port: {port} {reason}; give another, or 0 for any that is free"
+            ) from None
+
+    @property
+    def address(self) -> str:
+        """The page's address."""
+        return f"http://{HOST}:{self.server_port}/"
+
+    @property
+    def names(self) -> set[str]:
+        """What browsers may call this server; a foreign name could be another site's."""
+        return {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that went away is no error; says anything else in one line."""
+        del request, client_address
+        error = sys.exc_info()[1]
+        if not isinstance(error, ConnectionError):
+            print(f"Error: {type(error).__name__}: {error}", file=sys.stderr)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: StudioServer
+    protocol_version = "HTTP/1.1"
+    paths: ClassVar[dict[str, str]] = {"/": HTML, "/runs": JSON, "/scenario.toml": TOML}
+
+    def do_GET(self) -> None:
+        if self.headers.get("Host") not in self.server.names:
+            return self._send(HTTPStatus.FORBIDDEN, "text/plain", "another site's name\n")
+        asked = urlsplit(self.path)
+        kind = self.paths.get(asked.path)
+        if kind is None:
+            return self._send(HTTPStatus.NOT_FOUND, "text/plain", "there is no such page\n")
+        try:
+            text = self._answer(asked.path, dict(parse_qsl(asked.query, keep_blank_values=True)))
+        except CorampError as error:
+            return self._send(HTTPStatus.BAD_REQUEST, "text/plain", "\n".join(error.messages))
+        return self._send(HTTPStatus.OK, kind, text)
+
+    def _answer(self, path: str, asked: dict[str, str]) -> str:
+        answers = self.server.answers
+        match path:
+            case "/runs":
+                return answers.runs(asked)
+            case "/scenario.toml":
+                return answers.scenario_toml(asked)
+            case _:
+                return answers.page()
+
+    def _send(self, status: HTTPStatus, kind: str, text: str) -> None:
+        content = text.encode()
+        self.send_response(status)
+        self.send_header("Content-Type", f"{kind}; charset=utf-8")
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", POLICY)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cache-Control", "no-store")
+        if kind == TOML:
+            name = self.server.answers.saved_name
+            self.send_header("Content-Disposition", f'attachment; filename="{name}.toml"')
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the library names it
+        """Says nothing of what goes well."""
+
+
+def serve(scenario: str, port: int, say: Callable[[str], None]) -> None:
+    """Serves the studio of a scenario until it is interrupted; ``say`` is told its address.
+
+    Raises CorampError for a scenario that is not valid and for a port that cannot be taken.
+    """
+    with StudioServer(scenario, port) as server:
+        say(server.address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            return
