@@ -8,6 +8,7 @@ import polars as pl
 from coramp.errors import CorampError
 from coramp.planning import PlannedSnapshot
 from coramp.run_folder import StoredRun
+from coramp.studies.tables import Table
 
 if TYPE_CHECKING:
     from coramp.report.style import Figure
@@ -65,6 +66,13 @@ class RunPlots:
 
         return story_figure(self.stored, vehicle_id)
 
+    def _repr_html_(self) -> str:
+        """Returns how a notebook shows the run: summary, replay and time-space diagram."""
+        from coramp.report.page.notebook import run_html
+        from coramp.report.page.shown import shown_run
+
+        return run_html(shown_run(self.stored))
+
 
 class PlanPlots:
     """The figure of a plan."""
@@ -77,13 +85,26 @@ class PlanPlots:
 
         return plan_figure(self.planned)
 
+    def _repr_html_(self) -> str:
+        """Returns how a notebook shows the plan: decisions, before and after."""
+        from coramp.report.page.notebook import plan_html
+
+        return plan_html(self.planned)
+
 
 class StudyPlots:
     """The figures of a study; each needs the layout that its runs are those of."""
 
     folder: Path
     runs: pl.DataFrame
+    tables: tuple[Table, ...]
     layout: str
+
+    def _repr_html_(self) -> str:
+        """Returns how a notebook shows the study: its tables and figures."""
+        from coramp.report.page.notebook import study_html
+
+        return study_html(self.tables, self.layout, self.runs)
 
     def plot_delay(self) -> "Figure":
         """Returns mean delay (s) by flow with 95 % intervals over seeds, a diagram a stream.

@@ -1,13 +1,10 @@
 """Reports and replays in a real headless Chromium."""
 
 import json
-import os
 import shutil
-from contextlib import contextmanager
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
 
 import coramp
 from coramp.core.trajectory import station_and_speed
@@ -15,8 +12,8 @@ from coramp.errors import CorampError
 from coramp.metrics.schemas import RESULT_VERSION
 from coramp.report.plan_figure import pieces_of_each
 from coramp.reporting import replay, report
+from tests.report.browser import chromium, in_browser, opened
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
 TRAFFIC = {"mainline_veh_h": 1800.0, "ramp_veh_h": 500.0, "seed": 77, "horizon_s": 120.0}
 STUDY = """
 name = "small"
@@ -28,11 +25,6 @@ strategies = ["mainline-priority", "ramp-priority"]
 flows_veh_h = [[800, 200], [1800, 500]]
 engine = "exact"
 """
-
-in_browser = pytest.mark.skipif(
-    CHROMIUM is None and os.environ.get("CI") != "true",
-    reason="needs chromium (apt-get install chromium)",
-)
 
 
 @pytest.fixture(scope="module")
@@ -48,28 +40,8 @@ def folders(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    assert CHROMIUM is not None, "there is no chromium; apt-get install chromium"
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    with chromium() as browser:
         yield browser
-        browser.close()
-
-
-@contextmanager
-def opened(browser, path, width=1100, **options):
-    """The page, once its runs are shown; asks for nothing and complains of nothing."""
-    context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-    page = context.new_page()
-    requests, complaints = [], []
-    page.on("request", lambda request: requests.append(request.url))
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.goto(path.as_uri())
-    page.evaluate("coramp.ready")
-    yield page
-    assert requests == [path.as_uri()]
-    assert complaints == []
-    context.close()
 
 
 @in_browser
@@ -77,7 +49,7 @@ def test_scrubbing_puts_vehicles_where_the_records_say(browser, folders):
     path = report(folders / "mainline-priority", folders / "uncontrolled")
     records = coramp.run("paper", engine="exact", **TRAFFIC)
     pieces = {name: rows for name, rows, _ in pieces_of_each(records.trajectories)}
-    with opened(browser, path) as page:
+    with opened(browser, path.as_uri()) as page:
         for time_s in (31.0, 55.5, 90.2):
             page.locator("input[type=range]").fill(str(time_s))
             seen = page.evaluate("coramp.shown.replay.positions(0)")
@@ -99,7 +71,7 @@ def test_scrubbing_puts_vehicles_where_the_records_say(browser, folders):
 @in_browser
 def test_playing_moves_vehicles(browser, folders):
     path = replay(folders / "mainline-priority", folders / "ramp-priority")
-    with opened(browser, path) as page:
+    with opened(browser, path.as_uri()) as page:
         before = page.evaluate("coramp.shown.replay.time")
         page.get_by_role("button", name="play").click()
         page.wait_for_function(f"coramp.shown.replay.time > {before} + 0.5")
@@ -112,7 +84,7 @@ def test_playing_moves_vehicles(browser, folders):
 @in_browser
 def test_hovering_shows_the_decision_with_its_equations(browser, folders):
     path = report(folders / "mainline-priority")
-    with opened(browser, path) as page:
+    with opened(browser, path.as_uri()) as page:
         place = page.evaluate(
             "(() => { const d = coramp.shown.diagrams[0], run = d.run;"
             " const i = run.everyone.find((i) => run.decisionsOf.has(i) && run.merge[i] !== null);"
@@ -138,7 +110,7 @@ def test_hovering_shows_the_decision_with_its_equations(browser, folders):
 @in_browser
 def test_the_keyboard_reaches_a_vehicles_decision(browser, folders):
     path = report(folders / "mainline-priority")
-    with opened(browser, path) as page:
+    with opened(browser, path.as_uri()) as page:
         page.locator(".plot").focus()
         page.keyboard.press("n")
         assert "r00001" in page.locator(".details h4").inner_text()
@@ -153,7 +125,7 @@ def test_the_keyboard_reaches_a_vehicles_decision(browser, folders):
 @pytest.mark.parametrize("width", [375, 1100])
 def test_pages_are_for_everyone(browser, folders, colours, width):
     for path in (report(folders / "study"), replay(folders / "uncontrolled")):
-        with opened(browser, path, width, color_scheme=colours) as page:
+        with opened(browser, path.as_uri(), width, color_scheme=colours) as page:
             assert page.evaluate("document.documentElement.scrollWidth") <= width
             found = Axe().run(page).response["violations"]
             assert [v["id"] for v in found if v["impact"] in ("serious", "critical")] == []
@@ -161,11 +133,32 @@ def test_pages_are_for_everyone(browser, folders, colours, width):
 
 @in_browser
 def test_a_study_shows_strategy_against_strategy(browser, folders):
-    with opened(browser, report(folders / "study")) as page:
+    with opened(browser, report(folders / "study").as_uri()) as page:
         assert page.locator("#show canvas[role=img]").count() == 2
         page.locator("[data-chooses=second]").select_option("nothing")
         page.evaluate("coramp.ready")
         assert page.locator("#show canvas[role=img]").count() == 1
+
+
+@in_browser
+def test_a_notebook_shows_runs_studies_and_plans(browser, folders, tmp_path):
+    run = coramp.run("paper", engine="exact", **TRAFFIC)
+    study = coramp.study(str(folders / "s.toml"), seeds=2, jobs=1, out=folders / "study")
+    parts = [found._repr_html_() for found in (run, study, coramp.plan("example"))]
+    page_text = f"<!DOCTYPE html><html lang=en><title>Notebook</title>{''.join(parts)}</html>"
+    (tmp_path / "notebook.html").write_text(f"<script>coramp = {{}}</script>{page_text}")
+    with opened(browser, (tmp_path / "notebook.html").as_uri()) as page:
+        frame = page.frame_locator("iframe")
+        frame.locator("canvas[role=img]").wait_for()
+        frame.get_by_role("button", name="play").click()
+        frame.get_by_role("button", name="pause").wait_for()
+        pictures = page.locator("img").evaluate_all(
+            "all => all.map((i) => [i.alt, i.naturalWidth])"
+        )
+        assert len(pictures) == 4
+        assert all(alt and width > 100 for alt, width in pictures)
+        assert f"{run.summary['ramp_delay_s']:.2f} s on the ramp" in page.inner_text("body")
+        assert "reach" in page.inner_text("body")
 
 
 def test_a_report_names_its_numbers(folders):

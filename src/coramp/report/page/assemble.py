@@ -23,17 +23,18 @@ def assembled(template: str, own: Sequence[str] = REPORT_SCRIPTS, **values: Any)
 
     ``own`` are the scripts that it has beside those of every page.
     """
-    page = (
-        _environment()
-        .get_template(template)
-        .render(
-            styles=[asset(name) for name in STYLES],
-            library=asset(LIBRARY),
-            scripts="\n".join(asset(name) for name in (*SCRIPTS, *own)),
-            **values,
-        )
+    return rendered(
+        template,
+        styles=[asset(name) for name in STYLES],
+        library=asset(LIBRARY),
+        scripts="\n".join(asset(name) for name in (*SCRIPTS, *own)),
+        **values,
     )
-    return page + "\n"
+
+
+def rendered(template: str, **values: Any) -> str:
+    """Returns a template with its values in it."""
+    return _environment().get_template(template).render(**values) + "\n"
 
 
 @cache

@@ -1,12 +1,9 @@
 """The report of a study: its answer, its tables and pictures, and what it does not know."""
 
-import base64
-import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import polars as pl
-from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
 from coramp.files import read_json
@@ -17,8 +14,9 @@ from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import ShownRun, played
+from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
-from coramp.report.style import UNDATED, look_of
+from coramp.report.style import look_of
 from coramp.run_folder import check_version
 from coramp.running import make_spec
 from coramp.studies.definition import Study, count_runs
@@ -62,7 +60,7 @@ def study_page(folder: Path, say: Callable[[str], None]) -> str:
         answer=_answer(good),
         notes=list(_notes(study, runs)),
         tables=summary_tables(study, runs),
-        pictures=[_picture(text, draw(good)) for text, draw in DRAWN.get(study.layout, ())],
+        pictures=pictures_of(study.layout, good),
         failed=_failed(runs),
         sure=_how_sure(good),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
@@ -179,10 +177,11 @@ def _how_sure(good: pl.DataFrame) -> list[str]:
     ]
 
 
-def _picture(text: str, figure: Figure) -> Row:
-    content = io.BytesIO()
-    figure.savefig(content, format="svg", metadata=UNDATED["svg"])
-    return {"text": text, "svg": base64.b64encode(content.getvalue()).decode("ascii")}
+def pictures_of(layout: str, good: pl.DataFrame) -> list[Row]:
+    """Returns the figures of a study's layout, of the runs that went well, as parts of a page."""
+    if good.is_empty():
+        return []
+    return [picture(text, draw(good)) for text, draw in DRAWN.get(layout, ())]
 
 
 def _cells(

@@ -100,8 +100,8 @@ coramp.Studio = class {
       element('p', { role: 'alert', class: 'problem' }, line)));
     const save = document.getElementById('save');
     if (problems.length) save.removeAttribute('href');
-    document.getElementById('show').classList.toggle('stale', problems.length > 0);
-    document.getElementById('figures').classList.toggle('stale', problems.length > 0);
+    ['answer', 'show', 'figures'].forEach((id) =>
+      document.getElementById(id).classList.toggle('stale', problems.length > 0));
   }
 
   show(told) {
@@ -121,9 +121,10 @@ coramp.Studio = class {
     const rows = table.rows.map((row) => element('tr', {}, ...row.map((text) => element('td', {}, text))));
     const followed = moved.length
       ? [element('p', { class: 'quiet' }, `What was set moved ${moved.join(' and ')}.`)] : [];
-    document.getElementById('figures').replaceChildren(
+    document.getElementById('answer').replaceChildren(
       element('p', { class: 'answer' }, answer),
-      ...notes.map((line) => element('p', { class: 'note' }, line)), ...followed,
+      ...notes.map((line) => element('p', { class: 'note' }, line)), ...followed);
+    document.getElementById('figures').replaceChildren(
       element('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': table.title },
         element('table', {}, element('caption', {}, table.title),
           element('thead', {}, element('tr', {}, ...head)), element('tbody', {}, ...rows))),
