@@ -10,6 +10,7 @@ from coramp.report.page.shown import ShownRun, shown_run
 from coramp.report.page.study_page import study_page
 from coramp.run_folder import MARK, StoredRun, read_run
 from coramp.studies.store import MARK as STUDY_MARK
+from coramp.toml_files import builtin_names
 
 REPORT, REPLAY = "report.html", "replay.html"
 
@@ -59,13 +60,17 @@ def _shown(stored: StoredRun) -> ShownRun:
     return shown_run(stored)
 
 
+def _scenario_file(name: str) -> str:
+    return name if name in builtin_names("scenarios") else f"{name}.toml"
+
+
 def _repeat(stored: list[StoredRun]) -> list[str]:
-    """The commands that run it again; a scenario of one's own is named as its file must be."""
+    """The commands that run it again; a scenario of one's own is taken to lie in NAME.toml."""
     lines = []
     for content in (run.content for run in stored):
         horizon_s = content["specification"]["simulation"]["horizon_s"]
         parts = [
-            f"coramp run {content['scenario']} --strategy {content['strategy']}",
+            f"coramp run {_scenario_file(content['scenario'])} --strategy {content['strategy']}",
             f"--engine {content['engine']}",
             f"--mainline {content['mainline_veh_h']:g} --ramp {content['ramp_veh_h']:g}",
             f"--seed {content['seed']} --horizon {horizon_s:g}",

@@ -202,3 +202,21 @@ def test_an_empty_folder_a_newer_format_and_other_arrivals_are_refused(folders, 
     coramp.run("paper", engine="exact", out=tmp_path / "other", **other)
     with pytest.raises(CorampError, match="other vehicles arrive there"):
         replay(folders / "mainline-priority", tmp_path / "other")
+
+
+def test_a_run_that_gives_other_delays_than_the_study_is_not_shown(folders, tmp_path):
+    import polars as pl
+
+    other = shutil.copytree(folders / "study", tmp_path / "other")
+    runs = pl.read_parquet(other / "runs.parquet")
+    mine = pl.col("strategy") == "ramp-priority"
+    delay = pl.when(mine).then(pl.col("ramp_delay_s") + 1.0).otherwise("ramp_delay_s")
+    runs.with_columns(ramp_delay_s=delay).write_parquet(other / "runs.parquet")
+    said = []
+    text = report(other, say=said.append).read_text()
+    assert (
+        said.count("ramp priority is not shown: run again it gives other delays than the study has")
+        == 2
+    )
+    assert ">ramp priority</option>" not in text
+    assert ">mainline priority</option>" in text
