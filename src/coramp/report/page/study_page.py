@@ -112,6 +112,8 @@ def _answer(good: pl.DataFrame) -> str:
     """What each strategy loses at the highest flow that all share, in a sentence."""
     mainline, ramp = _shared_flows(good)[-1]
     at = _plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
+    main = at.filter(pl.col("drivers").is_null() | pl.col("drivers").is_in(SHOWN_DRIVERS))
+    at = main if main.height else at
     parts = []
     for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
         delays = [
