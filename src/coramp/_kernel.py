@@ -54,3 +54,11 @@ def _cache_directory() -> Path:
         for outdated in root.glob("kernels-*"):
             shutil.rmtree(outdated, ignore_errors=True)
     return directory
+
+
+def compiling() -> bool:
+    """Returns whether a kernel is being compiled now."""
+    from numba.core.compiler_lock import global_compiler_lock as untyped_lock
+
+    lock: Any = untyped_lock
+    return bool(lock.is_locked())

@@ -57,15 +57,36 @@ def scenarios(
 
 @app.command(epilog="Example: coramp strategies")
 def strategies(json: Json = False) -> None:
-    """List the strategies."""
+    """List the strategies, with the package of those that are not coramp's own."""
     from coramp.console import print_json, print_listing
+    from coramp.strategies.registry import OURS, broken_plugins, origin_of
     from coramp.strategies.registry import strategies as registered
 
-    found = {"strategies": {name: s.summary for name, s in registered().items()}}
+    origins = {name: origin_of(name) for name in registered()}
+    texts = {
+        name: s.summary if origins[name] == OURS else f"{s.summary} [{origins[name]}]"
+        for name, s in registered().items()
+    }
+    found = {"strategies": texts}
+    for problem in broken_plugins():
+        print(f"Left out: {problem}", file=sys.stderr)
     if json:
         print_json(found)
     else:
         print_listing(found)
+
+
+@app.command("new-strategy", epilog="Example: coramp new-strategy mine && pip install ./mine")
+def new_strategy(
+    name: Annotated[str, typer.Argument(help="The strategy's name, such as mine.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write (default: ./NAME).")] = None,
+) -> None:
+    """Write a package with a strategy of your own, working, and its contract test."""
+    from coramp.skeleton import write_skeleton
+
+    folder = write_skeleton(name, out or Path(name))
+    place = folder if folder.is_absolute() else f"./{folder}"
+    print(f"Written: {folder}; now pip install {place}, and coramp run paper --strategy {name}")
 
 
 @app.command(epilog="Example: coramp plan example --plot example.png")

@@ -8,6 +8,7 @@ import polars as pl
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
+from coramp.coordination.guard import strategy_to_run
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.metrics.schemas import TRAJECTORIES
@@ -15,7 +16,6 @@ from coramp.metrics.tables import decisions_table
 from coramp.records import LANES
 from coramp.scenario import Scenario
 from coramp.snapshots import Snapshot, SnapshotVehicle
-from coramp.strategies.registry import strategy_named
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
 
     Raises CorampError where the strategy plans nothing, or the situation is lost already.
     """
-    chosen = strategy_named(strategy)
+    chosen = strategy_to_run(strategy)
     if not chosen.cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     scenario = snapshot.road()
@@ -45,7 +45,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         for v in vehicles
     ]
     coordinator = Coordinator(
-        chosen(), scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+        chosen, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
     )
     for number, vehicle in enumerate(vehicles):
         if not coordinator.place(number, vehicle.station_m, 0):

@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from coramp.coordination.guard import strategy_to_run
 from coramp.engines.exact.engine import run_exact
 from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
 from coramp.errors import CorampError
@@ -157,7 +158,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     """
     options = options or SumoOptions()
     started = time.perf_counter()
-    strategy = strategy_named(spec.strategy)()
+    strategy = strategy_to_run(spec.strategy)
     if spec.engine == "exact":
         outcome = run_exact(spec.scenario, strategy, spec.seed)
     elif strategy.cooperative:

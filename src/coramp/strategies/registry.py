@@ -1,4 +1,10 @@
-"""All strategies by name."""
+"""All strategies by name: coramp's own, those of installed packages, those of this process.
+
+A package adds its own by an entry point of the group ``coramp.strategies``.
+"""
+
+from functools import cache
+from importlib import metadata
 
 from coramp.errors import CorampError
 from coramp.strategies.base import Strategy
@@ -6,6 +12,8 @@ from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.ramp_priority import RampPriority
 from coramp.strategies.uncontrolled import Uncontrolled
 
+GROUP = "coramp.strategies"
+OURS = "coramp"
 _STRATEGIES: dict[str, type[Strategy]] = {}
 
 
@@ -35,12 +43,63 @@ for _strategy in _OURS:
 
 
 def strategies() -> dict[str, type[Strategy]]:
-    """Returns all registered strategies by name, in the order of registration."""
-    return dict(_STRATEGIES)
+    """Returns all strategies by name: ours, those registered, those of installed packages.
+
+    A package whose strategy cannot be loaded is left out; ``broken_plugins`` says why.
+    """
+    installed = {name: found for name, (found, _) in _installed().items() if found is not None}
+    return {**_STRATEGIES, **{k: v for k, v in installed.items() if k not in _STRATEGIES}}
+
+
+def origin_of(name: str) -> str:
+    """Returns where a strategy comes from: coramp, a package with its version, or this process."""
+    known = _STRATEGIES.get(name)
+    if known in _OURS:
+        return OURS
+    return "this process" if known is not None else _installed()[name][1]
+
+
+def broken_plugins() -> list[str]:
+    """Returns a line for each installed strategy that cannot be loaded."""
+    return [told for found, told in _installed().values() if found is None]
 
 
 def strategy_named(name: str) -> type[Strategy]:
-    """Returns the strategy of that name; raises CorampError if there is none."""
-    if name not in _STRATEGIES:
-        raise CorampError(f"strategy: there is no {name!r}; allowed are {', '.join(_STRATEGIES)}")
-    return _STRATEGIES[name]
+    """Returns the strategy of that name; raises CorampError if there is none, or it is broken."""
+    if name in _STRATEGIES:
+        return _STRATEGIES[name]
+    found, told = _installed().get(name, (None, ""))
+    if found is not None:
+        return found
+    if told:
+        raise CorampError(told)
+    raise CorampError(f"strategy: there is no {name!r}; allowed are {', '.join(strategies())}")
+
+
+@cache
+def _installed() -> dict[str, tuple[type[Strategy] | None, str]]:
+    """Strategies of installed packages with their origin, or None with what is wrong."""
+    found: dict[str, tuple[type[Strategy] | None, str]] = {}
+    for point in metadata.entry_points(group=GROUP):
+        package = point.dist
+        origin = f"{package.name} {package.version}" if package is not None else point.value
+        try:
+            loaded = point.load()
+        except Exception as error:  # noqa: BLE001 - a package's mistake must not stop the others
+            reason = f"{type(error).__name__}: {error}"
+        else:
+            reason = _wrong_with(loaded, point.name)
+        told = f"strategy {point.name} of {origin}: {reason}"
+        found[point.name] = (None, told) if reason else (loaded, origin)
+    return found
+
+
+def _wrong_with(loaded: object, name: str) -> str:
+    lacking = [
+        part for part in ("name", "summary", "cooperative", "decide") if not hasattr(loaded, part)
+    ]
+    if not isinstance(loaded, type) or lacking:
+        return f"is no strategy: it lacks {', '.join(lacking) or 'a class'}"
+    if loaded.name != name:  # type: ignore[attr-defined]
+        return f"calls itself {loaded.name!r}"  # type: ignore[attr-defined]
+    return f"{name} is coramp's own name" if name in _STRATEGIES else ""

@@ -1,0 +1,139 @@
+"""Holds a strategy that is not coramp's own to the interface: what it may answer, and how long."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import numpy as np
+
+from coramp._kernel import compiling
+from coramp.core.fleet import MAX_CHANGED
+from coramp.core.trajectory import MAX_PIECES
+from coramp.errors import CorampError
+from coramp.strategies.base import (
+    Decision,
+    FollowTrajectory,
+    Memory,
+    ReleaseToDriver,
+    Strategy,
+    View,
+)
+from coramp.strategies.registry import OURS, origin_of, strategy_named
+
+LONGEST_DECISION_S = 10.0
+"""Wall time after which a decision counts as one that never comes; compiling does not count."""
+MOST_AT_ONCE = 10_000
+"""So many decisions at one time are a strategy that wakes itself without end."""
+
+
+class TooLong(BaseException):
+    """A decision takes too long; no ``except Exception`` of a strategy catches it."""
+
+
+class Guarded:
+    """A strategy whose mistakes become a CorampError that names it, in one line."""
+
+    summary = ""
+
+    def __init__(self, strategy: Strategy, longest_s: float = LONGEST_DECISION_S) -> None:
+        self.name = strategy.name
+        self.cooperative = strategy.cooperative
+        self._strategy = strategy
+        self._longest_s = longest_s
+        self._time_s = -1.0
+        self._at_once = 0
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns what the strategy decides; raises CorampError where that cannot be used."""
+        self._at_once = self._at_once + 1 if view.time_s == self._time_s else 0
+        self._time_s = view.time_s
+        try:
+            with time_limit(self._longest_s):
+                decision = self._strategy.decide(view, memory)
+        except TooLong:
+            problem = f"takes longer than {self._longest_s:g} s to decide"
+        except Exception as error:  # noqa: BLE001 - it may raise anything
+            problem = f"raises {type(error).__name__}: {error}"
+        else:
+            problem = _wrong_with(decision, view)
+        if self._at_once > MOST_AT_ONCE:
+            problem = "wakes itself without end"
+        if problem:
+            raise CorampError(f"strategy {self.name}: at {view.time_s:.1f} s it {problem}")
+        return decision
+
+
+def strategy_to_run(name: str) -> Strategy:
+    """Returns a strategy by name, guarded unless it is coramp's own; raises CorampError if none."""
+    chosen = strategy_named(name)
+    if origin_of(name) == OURS:
+        return chosen()
+    try:
+        return cast("Strategy", Guarded(chosen()))
+    except Exception as error:
+        raise CorampError(f"strategy {name}: raises {type(error).__name__}: {error}") from error
+
+
+@contextmanager
+def time_limit(longest_s: float) -> Iterator[None]:
+    """Raises TooLong inside the block after that time; only the main thread can be interrupted."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def give_up(*_: object) -> None:
+        if compiling():
+            signal.setitimer(signal.ITIMER_REAL, longest_s)
+            return
+        raise TooLong
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.setitimer(signal.ITIMER_REAL, longest_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _wrong_with(decision: Any, view: View) -> str:
+    if not isinstance(decision, Decision):
+        return f"returns {type(decision).__name__}; allowed is a Decision"
+    live = set(view.fleet.live.tolist())
+    if len(decision.commands) > MAX_CHANGED:
+        return f"commands {len(decision.commands)} vehicles; allowed are {MAX_CHANGED} at a time"
+    rows = [command.row for command in decision.commands]
+    wakes = [row for _, row in decision.wakes_s]
+    if unknown := [row for row in (*rows, *wakes) if row not in live]:
+        return f"commands an unknown vehicle, row {unknown[0]}"
+    if len(set(rows)) < len(rows):
+        return "commands a vehicle twice"
+    for wake_s, _ in decision.wakes_s:
+        if not wake_s >= view.time_s or wake_s == np.inf:
+            return f"asks to be woken at {wake_s} s; allowed is the present or later"
+    try:
+        hash(decision.memory)
+    except TypeError:
+        return "has a memory that is not hashable"
+    return next(filter(None, map(_wrong_command, decision.commands)), "")
+
+
+def _wrong_command(command: Any) -> str:
+    if isinstance(command, ReleaseToDriver):
+        return ""
+    if not isinstance(command, FollowTrajectory):
+        return f"commands {type(command).__name__}; allowed are FollowTrajectory, ReleaseToDriver"
+    pieces = command.pieces
+    if not isinstance(pieces, np.ndarray) or pieces.ndim != 2 or pieces.shape[1] != 4:
+        return "commands pieces that are no array of four columns"
+    if not 1 <= len(pieces) <= MAX_PIECES:
+        return f"commands {len(pieces)} pieces; allowed are 1 to {MAX_PIECES}"
+    if (
+        pieces.dtype != np.float64
+        or not np.isfinite(pieces).all()
+        or np.isnan(command.merge_time_s)
+    ):
+        return "commands numbers that are not finite"
+    return ""

@@ -1,0 +1,70 @@
+"""The contract that every strategy keeps, to be checked on one of your own."""
+
+from collections.abc import Iterable
+from typing import cast
+
+import numpy as np
+
+from coramp.arrivals import arrivals_of
+from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.guard import Guarded
+from coramp.loading import load_scenario
+from coramp.scenario import Scenario
+from coramp.strategies.base import Decision, Memory, Strategy, View
+
+FLOWS_VEH_H = ((800.0, 200.0), (1800.0, 500.0), (2600.0, 900.0))
+
+
+class Twice:
+    """Asks a strategy twice; it must answer the same, and leave what it is shown alone."""
+
+    summary = ""
+
+    def __init__(self, strategy: type[Strategy]) -> None:
+        self.name, self.cooperative = strategy.name, strategy.cooperative
+        self.asked = 0
+        self._strategy = strategy
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the decision; raises AssertionError where the contract is broken."""
+        self.asked += 1
+        shown = [*view.fleet, *view.acknowledged]
+        copies = [array.copy() for array in shown]
+        decision = self._strategy().decide(view, memory)
+        again = self._strategy().decide(view, memory)
+        for array, copy in zip(shown, copies, strict=True):
+            np.testing.assert_array_equal(array, copy, f"{self.name} writes into its view")
+        if repr(decision) != repr(again):
+            raise AssertionError(f"{self.name} answers the same question differently")
+        return decision
+
+
+def check_strategy(strategy: type[Strategy], seeds: Iterable[int] = (1, 2, 3)) -> None:
+    """Runs a strategy over flows low and high and checks what every strategy promises.
+
+    It answers every view, the same each time, changes nothing that it is shown, commands only who
+    is there, nothing that is not finite, and lets everyone through. Raises AssertionError or
+    CorampError, naming the strategy, where it does not.
+    """
+    for mainline_veh_h, ramp_veh_h in FLOWS_VEH_H:
+        flows = {"mainline.flow_veh_h": mainline_veh_h, "ramp.flow_veh_h": ramp_veh_h}
+        scenario = load_scenario("paper", {**flows, "simulation.horizon_s": 60.0})
+        for seed in seeds:
+            _check(Twice(strategy), scenario, seed)
+
+
+def _check(watched: Twice, scenario: Scenario, seed: int) -> None:
+    coordinator = Coordinator(
+        cast("Strategy", Guarded(cast("Strategy", watched))),
+        scenario.rules(),
+        arrivals_of(scenario, seed),
+        scenario.fastest_mainline_entry_mps,
+    )
+    coordinator.expect_arrivals()
+    coordinator.run(round(600.0 / scenario.control.step_s))
+    if watched.cooperative and not watched.asked:
+        raise AssertionError(f"{watched.name} was never asked")
+    fleet = coordinator.ledger.fleet
+    undecided = [row for row in fleet.live if fleet.merge_time_s[row] == np.inf]
+    if watched.cooperative and undecided:
+        raise AssertionError(f"{watched.name} leaves {len(undecided)} ramp vehicles waiting")

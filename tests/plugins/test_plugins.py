@@ -1,0 +1,243 @@
+"""Strategies of installed packages: found, named in errors, and unable to take a study down."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import coramp
+from coramp.coordination.guard import Guarded, time_limit
+from coramp.errors import CorampError
+from coramp.skeleton import write_skeleton
+from coramp.strategies.base import Decision, FollowTrajectory
+from coramp.strategies.mainline_priority import MainlinePriority
+from coramp.testing import check_strategy
+
+STUDY = """
+name = "mixed"
+scenario = "paper"
+horizon_s = 60.0
+[[runs]]
+strategies = ["mainline-priority", "{name}"]
+flows_veh_h = [[1300, 600]]
+engine = "exact"
+"""
+
+
+def raising(decide):
+    raise ZeroDivisionError("no gap to divide by")
+
+
+def not_finite(decide):
+    command = decide.commands[0]
+    pieces = command.pieces.copy()
+    pieces[-1, 2] = np.nan
+    return Decision((FollowTrajectory(command.row, pieces, command.merge_time_s),))
+
+
+def commanding_nobody(decide):
+    command = decide.commands[0]
+    return Decision((FollowTrajectory(9999, command.pieces, command.merge_time_s),))
+
+
+def asleep(_):
+    while True:
+        try:
+            time.sleep(60)
+        except Exception:  # noqa: BLE001 - as a careless strategy does
+            continue
+
+
+def answering_nothing(_):
+    return None
+
+
+def remembering_a_list(_):
+    return Decision(memory=[1])
+
+
+def waking_in_the_past(_):
+    return Decision(wakes_s=((-1.0, 0),))
+
+
+MISTAKES = [
+    (raising, "raises ZeroDivisionError: no gap to divide by"),
+    (not_finite, "commands numbers that are not finite"),
+    (commanding_nobody, "commands an unknown vehicle, row 9999"),
+    (asleep, "takes longer than"),
+    (answering_nothing, "returns NoneType; allowed is a Decision"),
+    (remembering_a_list, "has a memory that is not hashable"),
+    (waking_in_the_past, "asks to be woken at -1.0 s"),
+]
+
+
+def strategy_that_is(mistake):
+    """Mainline priority up to its first command, and then the mistake."""
+
+    class Wrong:
+        name, summary, cooperative = mistake.__name__.replace("_", "-"), "wrong", True
+
+        def decide(self, view, memory):
+            decision = MainlinePriority().decide(view, memory)
+            return mistake(decision) if decision.commands else decision
+
+    return Wrong
+
+
+@pytest.fixture
+def quick_guard(monkeypatch):
+    monkeypatch.setattr(Guarded.__init__, "__defaults__", (0.3,))
+
+
+@pytest.mark.parametrize(("mistake", "told"), MISTAKES)
+def test_a_mistake_fails_its_own_runs_only(mistake, told, tmp_path, quick_guard):
+    wrong = strategy_that_is(mistake)
+    coramp.register(wrong)
+    (tmp_path / "s.toml").write_text(STUDY.format(name=wrong.name))
+    study = coramp.study(str(tmp_path / "s.toml"), seeds=2, jobs=1, out=tmp_path / "out")
+    assert study.failed["strategy"].to_list() == [wrong.name] * 2
+    for error in study.failed["error"]:
+        assert error.startswith(f"strategy {wrong.name}: at ")
+        assert told in error
+        assert "\n" not in error
+    assert study.runs.filter(status="ok")["strategy"].to_list() == ["mainline-priority"] * 2
+
+
+def test_a_strategy_that_wakes_itself_without_end_is_stopped():
+    class Restless:
+        name, summary, cooperative = "restless", "never sleeps", True
+
+        def decide(self, view, memory):
+            return Decision(wakes_s=tuple((view.time_s, row) for row in view.subjects))
+
+    coramp.register(Restless)
+    with pytest.raises(CorampError, match=r"restless: at .* it wakes itself without end"):
+        coramp.run("paper", "restless", engine="exact", horizon_s=60)
+
+
+def test_one_that_cannot_be_made_is_named():
+    class Unmade:
+        name, summary, cooperative = "unmade", "cannot be made", True
+
+        def __init__(self):
+            raise RuntimeError("no licence")
+
+        def decide(self, view, memory):
+            return Decision()
+
+    coramp.register(Unmade)
+    with pytest.raises(CorampError, match="strategy unmade: raises RuntimeError: no licence"):
+        coramp.run("paper", "unmade", engine="exact", horizon_s=30)
+
+
+def test_the_time_limit_leaves_no_alarm():
+    with time_limit(0.05):
+        pass
+    time.sleep(0.1)
+
+
+def test_a_correct_strategy_of_ones_own_decides_as_it_would_unguarded():
+    class Same(MainlinePriority):
+        name = "same"
+
+    coramp.register(Same)
+    own, ours = (
+        coramp.run("paper", name, engine="exact", horizon_s=120, seed=9)
+        for name in ("same", "mainline-priority")
+    )
+    assert own.trajectories.equals(ours.trajectories)
+    assert own.decisions.equals(ours.decisions)
+
+
+def installed(folder, name, module, source, entry):
+    """What pip leaves of a package, as far as entry points go."""
+    info = folder / f"coramp_{name}-0.3.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: coramp-{name}\nVersion: 0.3\n")
+    (info / "entry_points.txt").write_text(f"[coramp.strategies]\n{name} = {module}:{entry}\n")
+    (folder / f"{module}.py").write_text(source)
+
+
+def coramp_with(folder, *words):
+    return subprocess.run(
+        [sys.executable, "-c", "from coramp.cli import main; main()", *words],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def test_installed_strategies_are_listed_with_their_origin_and_broken_ones_left_out(tmp_path):
+    package = write_skeleton("mine", tmp_path / "mine")
+    source = (package / "coramp_mine" / "__init__.py").read_text()
+    site = tmp_path / "site"
+    installed(site, "mine", "coramp_mine", source, "Mine")
+    installed(site, "torn", "coramp_torn", "import nothing_such\n", "Torn")
+    installed(site, "other", "coramp_other", source, "Mine")
+    listed = coramp_with(site, "strategies")
+    assert "mine " in listed.stdout
+    assert "[coramp-mine 0.3]" in listed.stdout
+    assert "torn" not in listed.stdout
+    assert "Left out: strategy torn of coramp-torn 0.3: ModuleNotFoundError" in listed.stderr
+    assert "strategy other of coramp-other 0.3: calls itself 'mine'" in listed.stderr
+    words = ("--engine", "exact", "--horizon", "60")
+    assert coramp_with(site, "run", "paper", "--strategy", "mine", *words).returncode == 0
+    torn = coramp_with(site, "run", "paper", "--strategy", "torn", *words)
+    assert torn.returncode == 1
+    assert torn.stderr.splitlines()[-1].startswith("Error: strategy torn of coramp-torn 0.3:")
+    (tmp_path / "s.toml").write_text(STUDY.format(name="mine"))
+    study = coramp_with(site, "study", str(tmp_path / "s.toml"), "--seeds", "2", "--jobs", "2",
+                        "--out", str(tmp_path / "out"))  # fmt: skip
+    assert study.returncode == 0, study.stderr
+
+
+def test_the_skeleton_keeps_the_contract(tmp_path, monkeypatch):
+    package = write_skeleton("by-feel", tmp_path / "by-feel")
+    monkeypatch.syspath_prepend(package)
+    from coramp_by_feel import ByFeel
+
+    check_strategy(ByFeel, seeds=(4,))
+    assert 'by-feel = "coramp_by_feel:ByFeel"' in (package / "pyproject.toml").read_text()
+    assert not [path for path in package.rglob("*") if path.is_file() and "@" in path.name]
+    assert not any("@NAME@" in path.read_text() for path in package.rglob("*.py"))
+
+
+@pytest.mark.parametrize("name", ["Mine", "my_own", "1st", "", "a--b", "-a"])
+def test_names_that_are_none_are_refused(name, tmp_path):
+    with pytest.raises(CorampError, match="is no name"):
+        write_skeleton(name, tmp_path / "x")
+
+
+def test_a_skeleton_overwrites_nothing(tmp_path):
+    write_skeleton("mine", tmp_path / "mine")
+    with pytest.raises(CorampError, match="is there already"):
+        write_skeleton("mine", tmp_path / "mine")
+    with pytest.raises(CorampError, match="there is such a strategy"):
+        write_skeleton("uncontrolled", tmp_path / "u")
+
+
+def test_the_contract_finds_what_breaks_it():
+    calls = []
+
+    class Fickle:
+        name, summary, cooperative = "fickle", "never the same", True
+
+        def decide(self, view, memory):
+            calls.append(view.time_s)
+            return Decision(wakes_s=((view.time_s + len(calls), view.subjects[0]),))
+
+    class Idle:
+        name, summary, cooperative = "idle", "leaves everyone waiting", True
+
+        def decide(self, view, memory):
+            return Decision()
+
+    with pytest.raises(CorampError, match=r"fickle: .* answers the same question differently"):
+        check_strategy(Fickle)
+    with pytest.raises(AssertionError, match=r"idle leaves .* waiting"):
+        check_strategy(Idle)
