@@ -15,6 +15,7 @@ from coramp.metrics.schemas import TRAJECTORIES
 from coramp.metrics.tables import decisions_table
 from coramp.records import LANES
 from coramp.scenario import Scenario
+from coramp.strategies.base import period_of
 from coramp.snapshots import Snapshot, SnapshotVehicle
 
 
@@ -36,6 +37,10 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
     Raises CorampError where the strategy plans nothing, or the situation is lost already.
     """
     chosen = strategy_to_run(strategy)
+    if period_of(chosen) is not None:
+        raise CorampError(
+            f"strategy: {strategy} steers step by step and plans nothing ahead; choose a planning one"
+        )
     if not chosen.cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     scenario = snapshot.road()

@@ -64,4 +64,5 @@ class Outcome:
     collisions: int
     decisions: tuple[DecisionRecord, ...] = ()
     refusals: tuple[Refusal, ...] = ()
+    interventions: int = 0
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))

@@ -158,7 +158,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     """
     options = options or SumoOptions()
     started = time.perf_counter()
-    strategy = strategy_to_run(spec.strategy)
+    strategy = strategy_to_run(spec.strategy, spec.scenario.strategy.get(spec.strategy))
     if spec.engine == "exact":
         outcome = run_exact(spec.scenario, strategy, spec.seed)
     elif strategy.cooperative:

@@ -14,6 +14,9 @@ from coramp.core.gaps import least_acceleration_mps2
 from coramp.core.ramp_acceleration import lag_m
 from coramp.core.rules import Control, MotionLimits, Road, Rules, SafetyBudget
 from coramp.core.safe_distance import braking_distance_m, merge_clearance_m
+from coramp.errors import CorampError
+from coramp.strategies.parameters import Value, wrong_settings
+from coramp.strategies.registry import strategy_named
 
 FASTEST_MPS = 60.0
 NEAREST_STOP_M = -1.0
@@ -141,7 +144,10 @@ class Simulation(Model):
 
 
 class Scenario(Model):
-    """Everything about a run but its strategy, drivers, flows' overrides and seed."""
+    """Everything about a run but its strategy, drivers, flows' overrides and seed.
+
+    ``strategy`` holds parameters of strategies by name: ``[strategy.alinea]``.
+    """
 
     name: Annotated[str, Field(min_length=1)]
     description: str = ""
@@ -154,11 +160,12 @@ class Scenario(Model):
     drivers: dict[str, Drivers] = {}
     simulation: Simulation = Simulation()
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
+    strategy: dict[str, dict[str, Value]] = {}
 
     @model_validator(mode="after")
     def _works_together(self) -> Self:
         problems = [*_speed_problems(self), *_place_problems(self), *_flow_problems(self)]
-        problems += _clock_problems(self)
+        problems += [*_clock_problems(self), *_strategy_problems(self)]
         if not problems:
             problems += _planning_problems(self)
         if problems:
@@ -343,6 +350,18 @@ def _clock_problems(scenario: Scenario) -> list[str]:
             f"control.step_s: {control.step_s:g} is not what SUMO can step; "
             "allowed are whole milliseconds"
         )
+    return problems
+
+
+def _strategy_problems(scenario: Scenario) -> list[str]:
+    problems = []
+    for name, settings in scenario.strategy.items():
+        try:
+            found = strategy_named(name)
+        except CorampError as error:
+            problems += error.messages
+            continue
+        problems += [f"strategy.{name}.{line}" for line in wrong_settings(found, settings)]
     return problems
 
 

@@ -30,16 +30,19 @@ from coramp.coordination.gate import (
 )
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.plant import Arrival, Plant
+from coramp.coordination.supervisor import drive_safely
 from coramp.core.fleet import proposed
 from coramp.core.rules import Rules, packed
 from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import (
     Decision,
+    DriveWithAcceleration,
     Explanation,
     FollowTrajectory,
     Memory,
     Strategy,
     View,
+    period_of,
 )
 
 
@@ -62,10 +65,15 @@ class Refusal:
     reason: str
 
 
+PERIOD = -1
+"""Stands for a vehicle's row where the strategy is woken by its own clock."""
+
+
 class Coordinator:
     """Runs one strategy over given arrivals.
 
     Without a plant nobody carries the vehicles: the commitments are all there is.
+    ``interventions`` counts what the strategy commanded and the checker refused.
     """
 
     def __init__(
@@ -80,6 +88,7 @@ class Coordinator:
         self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(arrivals))
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
+        self.interventions = 0
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
@@ -93,10 +102,14 @@ class Coordinator:
         self._due_step: dict[int, int] = {}
         self._wakes: list[tuple[int, int]] = []
         self._announced = 0
+        period_s = period_of(strategy)
+        self._period_steps = 0 if period_s is None else max(1, round(period_s / self._step_s))
 
     def expect_arrivals(self) -> None:
-        """Lets every arrival come at its step."""
+        """Lets every arrival come at its step, and starts the strategy's own clock if it has one."""
         open_gate(self._gate)
+        if self._period_steps:
+            self._wake(self._period_steps, PERIOD)
 
     def run(self, last_step: int) -> None:
         """Handles every event up to and including ``last_step``."""
@@ -164,6 +177,10 @@ class Coordinator:
         return sorted(set(range(len(self._arrivals))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
+        if self._wakes[0] == (step, PERIOD):
+            heapq.heapreplace(self._wakes, (step + self._period_steps, PERIOD))
+            if len(self.ledger.fleet.live):
+                self._decide((), step)
         while subjects := self._woken(step):
             ready = tuple(row for row in subjects if not self._goes_on_to_station(row, step))
             if ready:
@@ -203,10 +220,7 @@ class Coordinator:
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self.ledger.commit(row, pieces, merge_time_s)
-        if self._plant is not None:
-            self._plant.follow(row, pieces, merge_time_s)
-        if row in self._due_step:
-            self._plan_when_due(row, pieces, step)
+        self._announce(row, step)
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
         due_s = decision_due_s(pieces, self._rules.road.decision_station_m)
@@ -244,10 +258,11 @@ class Coordinator:
             self._commit(move.row, move.pieces, move.merge_time_s, step)
         return True
 
-    def _decide(self, subjects: tuple[int, ...], step: int) -> None:
+    def view(self, subjects: tuple[int, ...], step: int) -> View:
+        """Returns what is known at a step."""
         time_s = step * self._step_s
         fleet = self.ledger.fleet
-        view = View(
+        return View(
             time_s,
             subjects,
             fleet,
@@ -257,13 +272,24 @@ class Coordinator:
             self._rules,
             self._packed,
         )
-        decision = self._strategy.decide(view, self._memory)
+
+    def _decide(self, subjects: tuple[int, ...], step: int) -> None:
+        decision = self._strategy.decide(self.view(subjects, step), self._memory)
+        self.carry_out(decision, subjects, step)
+
+    def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
+        """Commits what a decision commands, or its safe replacement, and notes its wake-up calls."""
+        time_s = step * self._step_s
+        drives = [c for c in decision.commands if isinstance(c, DriveWithAcceleration)]
+        if drives:
+            self._drive(drives, step)
         trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]
         margin_m = math.nan
         if trajectories:
             earliest_s = time_s + self._rules.control.actuation_delay_s
             verdict = self._examiner.change(self.ledger, trajectories, earliest_s)
             if verdict.code != ACCEPTED:
+                self.interventions += 1
                 self._refuse(subjects, step, verdict.code)
                 return
             margin_m = verdict.least_margin_m
@@ -276,6 +302,28 @@ class Coordinator:
             self._wake(wake_step, row)
             if wake_step > step:
                 self._moves_up(row, step)
+
+    def _drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> None:
+        carried_out = drive_safely(
+            self.ledger,
+            commands,
+            step * self._step_s,
+            self._fastest_entry_mps,
+            self._packed,
+            self._examiner.bounds,
+        )
+        self.interventions += len(commands) - sum(carried_out)
+        for command, driven in zip(commands, carried_out, strict=True):
+            if driven:
+                self._announce(command.row, step)
+
+    def _announce(self, row: int, step: int) -> None:
+        """Tells who carries the vehicle, and when it is planned, of its new commitment."""
+        pieces = self.ledger.trajectory(row)
+        if self._plant is not None:
+            self._plant.follow(row, pieces, self.ledger.merge_time_s(row))
+        if row in self._due_step:
+            self._plan_when_due(row, pieces, step)
 
     def _refuse(self, subjects: tuple[int, ...], step: int, code: int) -> None:
         retry_s = step * self._step_s + self._rules.control.retry_s

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, cast
 
@@ -14,11 +14,15 @@ from coramp.core.trajectory import MAX_PIECES
 from coramp.errors import CorampError
 from coramp.strategies.base import (
     Decision,
+    DriveWithAcceleration,
     FollowTrajectory,
     Memory,
     ReleaseToDriver,
+    SetRampSignal,
     Strategy,
     View,
+    is_metered,
+    period_of,
 )
 from coramp.strategies.registry import OURS, origin_of, strategy_named
 
@@ -40,6 +44,8 @@ class Guarded:
     def __init__(self, strategy: Strategy, longest_s: float = LONGEST_DECISION_S) -> None:
         self.name = strategy.name
         self.cooperative = strategy.cooperative
+        self.period_s = period_of(strategy)
+        self.metered = is_metered(strategy)
         self._strategy = strategy
         self._longest_s = longest_s
         self._time_s = -1.0
@@ -65,13 +71,16 @@ class Guarded:
         return decision
 
 
-def strategy_to_run(name: str) -> Strategy:
-    """Returns a strategy by name, guarded unless it is coramp's own; raises CorampError if none."""
-    chosen = strategy_named(name)
+def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Strategy:
+    """Returns a strategy by name, with its parameters, guarded unless it is coramp's own.
+
+    Raises CorampError if there is none such, or it cannot be made.
+    """
+    chosen: Any = strategy_named(name)
     if origin_of(name) == OURS:
-        return chosen()
+        return cast("Strategy", chosen(**(settings or {})))
     try:
-        return cast("Strategy", Guarded(chosen()))
+        return cast("Strategy", Guarded(chosen(**(settings or {}))))
     except Exception as error:
         raise CorampError(f"strategy {name}: raises {type(error).__name__}: {error}") from error
 
@@ -102,9 +111,10 @@ def _wrong_with(decision: Any, view: View) -> str:
     if not isinstance(decision, Decision):
         return f"returns {type(decision).__name__}; allowed is a Decision"
     live = set(view.fleet.live.tolist())
-    if len(decision.commands) > MAX_CHANGED:
-        return f"commands {len(decision.commands)} vehicles; allowed are {MAX_CHANGED} at a time"
-    rows = [command.row for command in decision.commands]
+    moved = [command for command in decision.commands if isinstance(command, FollowTrajectory)]
+    if len(moved) > MAX_CHANGED:
+        return f"commands {len(moved)} trajectories; allowed are {MAX_CHANGED} at a time"
+    rows = [command.row for command in decision.commands if hasattr(command, "row")]
     wakes = [row for _, row in decision.wakes_s]
     if unknown := [row for row in (*rows, *wakes) if row not in live]:
         return f"commands an unknown vehicle, row {unknown[0]}"
@@ -121,10 +131,14 @@ def _wrong_with(decision: Any, view: View) -> str:
 
 
 def _wrong_command(command: Any) -> str:
-    if isinstance(command, ReleaseToDriver):
+    if isinstance(command, ReleaseToDriver | SetRampSignal):
+        return ""
+    if isinstance(command, DriveWithAcceleration):
+        if not np.isfinite((command.accel_mps2, command.hold_s)).all() or command.hold_s <= 0.0:
+            return "commands numbers that are not finite, or a time that is not positive"
         return ""
     if not isinstance(command, FollowTrajectory):
-        return f"commands {type(command).__name__}; allowed are FollowTrajectory, ReleaseToDriver"
+        return f"commands {type(command).__name__}; allowed are those of strategies.base"
     pieces = command.pieces
     if not isinstance(pieces, np.ndarray) or pieces.ndim != 2 or pieces.shape[1] != 4:
         return "commands pieces that are no array of four columns"

@@ -116,7 +116,7 @@ def _safe_on_ramp(
     """
     if len(pieces) == 0:
         return False
-    leader = _next_ahead_on_ramp(fleet, row, from_s)
+    leader = next_ahead_on_ramp(fleet, row, from_s)
     own_m, _ = station_and_speed(pieces, from_s)
     for other in fleet.live:
         merge_s = merge_time_under_s(fleet, proposal, other)
@@ -154,7 +154,8 @@ def next_behind_on_ramp(fleet: Fleet, leader: int, from_s: float) -> int:
 
 
 @kernel
-def _next_ahead_on_ramp(fleet: Fleet, row: int, from_s: float) -> int:
+def next_ahead_on_ramp(fleet: Fleet, row: int, from_s: float) -> int:
+    """Returns the next ramp vehicle ahead of ``row`` without a committed merge, or -1."""
     own_m, _ = station_and_speed(committed(fleet, row), from_s)
     found, found_m = -1, math.inf
     for other in fleet.live:

@@ -67,6 +67,7 @@ def cooperative_outcome(
         collisions=collisions,
         decisions=tuple(coordinator.decisions),
         refusals=tuple(coordinator.refusals),
+        interventions=coordinator.interventions,
         vehicle_of_row=vehicle_of_row,
     )
 

@@ -4,7 +4,7 @@ import polars as pl
 
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 2
+RESULT_VERSION = 3
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -112,6 +112,7 @@ RUN_METRICS: Schema = {
     "rung_delay": pl.Int64,
     "rung_hold": pl.Int64,
     "refused_plans": pl.Int64,
+    "interventions": pl.Int64,
 }
 
 RUNS: Schema = {

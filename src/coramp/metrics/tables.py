@@ -334,7 +334,7 @@ def _decision_figures(outcome: Outcome) -> Row:
     """How many ramp vehicles each rung served (hold: how many waited), how many others moved."""
     if not outcome.cooperative:
         rungs = {f"rung_{rung}": None for rung in RUNGS}
-        return {"adjusted_vehicles": None, **rungs, "refused_plans": None}
+        return {"adjusted_vehicles": None, **rungs, "refused_plans": None, "interventions": None}
     served: dict[str, set[int]] = {rung: set() for rung in RUNGS}
     adjusted: set[int] = set()
     for decision in outcome.decisions:
@@ -344,4 +344,5 @@ def _decision_figures(outcome: Outcome) -> Row:
         "adjusted_vehicles": len(adjusted),
         **{f"rung_{rung}": len(rows) for rung, rows in served.items()},
         "refused_plans": len(outcome.refusals),
+        "interventions": outcome.interventions,
     }

@@ -1,7 +1,8 @@
 """The one interface that every strategy has.
 
-A strategy is asked when a cooperative vehicle reaches its decision station and whenever it has
-asked to be woken. It answers from the view and its own memory alone: ``decide`` is a pure function.
+A strategy is asked when a cooperative vehicle reaches its decision station, whenever it has asked
+to be woken and, if it has a ``period_s``, once in each such period, then without subjects. It
+answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
 from collections.abc import Callable, Hashable
@@ -27,6 +28,20 @@ class Reports:
     std_m: FloatArray
 
 
+@dataclass(frozen=True, slots=True)
+class Detectors:
+    """What the road's loop detectors tell of the time since they were last asked.
+
+    Occupancies are shares of the time (0 to 1) in which a vehicle stood on the loop: on the
+    mainline beside the acceleration lane, and at the upstream end of the ramp. ``passed_veh``
+    counts the vehicles that passed the ramp's stop line.
+    """
+
+    mainline_occupancy: float
+    queue_occupancy: float
+    passed_veh: int
+
+
 @dataclass(frozen=True)
 class View:
     """What the coordinator knows at ``time_s``: who has entered, and what they have committed to.
@@ -35,8 +50,8 @@ class View:
     their decision stations. ``acknowledged`` holds the commitments that vehicles have confirmed;
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
     which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
-    ``reports``. ``packed_rules`` are the rules as kernels take them (``core.rules``). A strategy
-    must not write into any of the arrays.
+    ``reports``. ``packed_rules`` are the rules as kernels take them (``core.rules``).
+    ``detectors`` is None where the road has none. A strategy must not write into any of the arrays.
     """
 
     time_s: float
@@ -47,6 +62,7 @@ class View:
     fastest_entry_mps: float
     rules: Rules
     packed_rules: FloatArray
+    detectors: Detectors | None = None
 
     @cached_property
     def reports(self) -> Reports:
@@ -68,13 +84,36 @@ class FollowTrajectory:
 
 
 @dataclass(frozen=True, slots=True)
+class DriveWithAcceleration:
+    """Drive with this acceleration (m/s2, signed) for ``hold_s``, then go on as is safe.
+
+    For feedback laws, which command anew before ``hold_s`` has passed. The speed stays between 0
+    and the lane's limit. ``merge`` lets a ramp vehicle come onto the mainline as soon as that is
+    safe; without it, it is to stop before the nose. Commands of this kind stand or fall one by one:
+    the supervisor (``coordination.supervisor``) replaces one that is not safe.
+    """
+
+    row: int
+    accel_mps2: float
+    hold_s: float
+    merge: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class SetRampSignal:
+    """Set the signal at the ramp's stop line (the nose) to green or red."""
+
+    green: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ReleaseToDriver:
     """Leave the vehicle to its driver, or in SUMO to its driver model."""
 
     row: int
 
 
-Command = FollowTrajectory | ReleaseToDriver
+Command = FollowTrajectory | DriveWithAcceleration | SetRampSignal | ReleaseToDriver
 
 
 class Explanation(NamedTuple):
@@ -112,7 +151,9 @@ Memory = Hashable
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """A strategy's answer: commands that stand or fall together, wake-up calls, its memory.
+    """A strategy's answer: commands, wake-up calls, its memory.
+
+    Trajectories of one decision stand or fall together.
 
     A wake is a pair of time (s) and row.
     """
@@ -124,7 +165,12 @@ class Decision:
 
 
 class Strategy(Protocol):
-    """Who yields to whom."""
+    """Who yields to whom.
+
+    A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
+    by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
+    for one that needs a signal and detectors on the ramp, in SUMO.
+    """
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -133,3 +179,13 @@ class Strategy(Protocol):
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision for ``view.subjects``; must not change the view."""
         ...
+
+
+def period_of(strategy: Strategy) -> float | None:
+    """Returns in which period (s) a strategy is woken besides, None for one that only plans."""
+    return getattr(strategy, "period_s", None)
+
+
+def is_metered(strategy: Strategy | type[Strategy]) -> bool:
+    """Returns whether a strategy needs a signal and detectors at the ramp."""
+    return bool(getattr(strategy, "metered", False))

@@ -9,8 +9,10 @@ from importlib import metadata
 from coramp.errors import CorampError
 from coramp.strategies.base import Strategy
 from coramp.strategies.mainline_priority import MainlinePriority
+from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.ramp_priority import RampPriority
 from coramp.strategies.uncontrolled import Uncontrolled
+from coramp.strategies.virtual_platoon import VirtualPlatoon
 
 GROUP = "coramp.strategies"
 OURS = "coramp"
@@ -37,7 +39,13 @@ def register(strategy: type[Strategy], *, replace: bool = False) -> None:
     _STRATEGIES[strategy.name] = strategy
 
 
-_OURS: tuple[type[Strategy], ...] = (MainlinePriority, RampPriority, Uncontrolled)
+_OURS: tuple[type[Strategy], ...] = (
+    MainlinePriority,
+    RampPriority,
+    VirtualPlatoon,
+    Ocbf,
+    Uncontrolled,
+)
 for _strategy in _OURS:
     _STRATEGIES[_strategy.name] = _strategy
 

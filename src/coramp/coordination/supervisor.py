@@ -1,0 +1,167 @@
+"""Keeps vehicles safe that are steered by acceleration: the safe fallback replaces what is not.
+
+A command is held for its time, and the checker is shown where that leads: a mainline vehicle that
+goes back to v0, a ramp vehicle that merges as in free movement or, where that is not safe yet, stops
+before the nose. What it lets pass is committed. What it refuses is not driven: the vehicle keeps its
+last commitment, which is safe to its end.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp.audit.checker import Change, examine
+from coramp.audit.distances import Bounds
+from coramp.audit.reasons import ACCEPTED
+from coramp.coordination.book import Book, fleet_of, is_full
+from coramp.coordination.book import write_commitment as write
+from coramp.coordination.gate import vehicles_of
+from coramp.coordination.ledger import Ledger
+from coramp.core.driving import hold_then_cruise, hold_then_merge, hold_then_stop
+from coramp.core.fleet import Fleet, committed
+from coramp.core.ramp_queue import next_ahead_on_ramp
+from coramp.core.approach import stop_of_m
+from coramp.core.rules import Rules, unpacked
+from coramp.core.safe_distance import merge_clearance_m, standing_clearance_m
+from coramp.core.trajectory import MAX_PIECES, STATION, TIME, cruise_intercept_m, station_and_speed
+from coramp.strategies.base import DriveWithAcceleration
+from coramp.strategies.situation import foremost_unknown_m
+
+OPEN, DRIVEN = 0, 1
+MOST_PASSES = 3
+"""A command that another one stands in the way of is tried again after that."""
+
+
+def drive_safely(
+    ledger: Ledger,
+    commands: Sequence[DriveWithAcceleration],
+    now_s: float,
+    fastest_entry_mps: float,
+    packed_rules: FloatArray,
+    bounds: Bounds,
+) -> list[bool]:
+    """Commits what is safe of the commands; returns for each whether it was carried out."""
+    rows = np.array([command.row for command in commands], np.int64)
+    wishes = np.array([(c.accel_mps2, c.hold_s) for c in commands])
+    merges = np.array([command.merge for command in commands], np.bool_)
+    done = np.zeros(len(rows), np.int64)
+    while True:
+        ledger.make_room()
+        finished = drive_all(
+            ledger.book, rows, wishes, merges, done, now_s, fastest_entry_mps, packed_rules, bounds
+        )
+        if finished:
+            return [bool(state == DRIVEN) for state in done.tolist()]
+
+
+@kernel
+def drive_all(
+    book: Book,
+    rows: IntArray,
+    wishes: FloatArray,
+    merges: BoolArray,
+    done: IntArray,
+    now_s: float,
+    fastest_entry_mps: float,
+    packed_rules: FloatArray,
+    bounds: Bounds,
+) -> bool:
+    """Commits what is safe, and notes it in ``done``; False where the book must grow first."""
+    rules = unpacked(packed_rules)
+    from_s = now_s + rules.control.actuation_delay_s
+    known_m = foremost_unknown_m(now_s, fastest_entry_mps, rules)
+    for _ in range(MOST_PASSES):
+        progress = False
+        for k in range(len(rows)):
+            if done[k] != OPEN:
+                continue
+            if is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
+                return False
+            if _drive_one(
+                book, rows[k], wishes[k, 0], wishes[k, 1], merges[k], from_s, known_m, rules, bounds
+            ):
+                done[k] = DRIVEN
+                progress = True
+        if not progress:
+            break
+    return True
+
+
+@kernel
+def _drive_one(
+    book: Book,
+    row: int,
+    accel_mps2: float,
+    hold_s: float,
+    merge: bool,
+    from_s: float,
+    known_m: float,
+    rules: Rules,
+    bounds: Bounds,
+) -> bool:
+    fleet = fleet_of(book)
+    out = np.empty((MAX_PIECES, 4))
+    merge_s = fleet.merge_time_s[row]
+    if merge_s <= from_s:
+        n = hold_then_cruise(fleet, row, accel_mps2, hold_s, from_s, rules, out)
+        return _commit_if_safe(book, row, out[:n], merge_s, from_s, rules, bounds)
+    if merge or merge_s < math.inf:
+        n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
+        if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
+            if _commit_if_safe(book, row, out[:n], out[n - 1, TIME], from_s, rules, bounds):
+                return True
+    if merge_s < math.inf:
+        return False
+    stop_m = _place_to_stop_m(fleet, row, from_s, rules)
+    n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
+    return _commit_if_safe(book, row, out[:n], math.inf, from_s, rules, bounds)
+
+
+@kernel
+def _known_enough(
+    fleet: Fleet, row: int, pieces: FloatArray, known_m: float, rules: Rules
+) -> bool:
+    """Whether the merge lies ahead of everyone who may still enter the mainline."""
+    end_m = cruise_intercept_m(pieces, rules.road.mainline_speed_mps)
+    room_m = fleet.length_m[row] + merge_clearance_m(rules.road, rules.safety)
+    return bool(end_m - room_m >= known_m)
+
+
+@kernel
+def _place_to_stop_m(fleet: Fleet, row: int, from_s: float, rules: Rules) -> float:
+    """Returns where a ramp vehicle is to stop: before the nose, or behind who is before it."""
+    stop_m = rules.road.stop_station_m
+    leader = next_ahead_on_ramp(fleet, row, from_s)
+    if leader < 0:
+        return stop_m
+    standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
+    return min(stop_m, stop_of_m(committed(fleet, leader)) - fleet.length_m[leader] - standing_m)
+
+
+@kernel
+def _commit_if_safe(
+    book: Book,
+    row: int,
+    pieces: FloatArray,
+    merge_s: float,
+    from_s: float,
+    rules: Rules,
+    bounds: Bounds,
+) -> bool:
+    if len(pieces) == 0:
+        return False
+    station_m, speed_mps = station_and_speed(committed(fleet_of(book), row), from_s)
+    change = Change(
+        np.array([row]),
+        np.array([len(pieces)]),
+        pieces.reshape((1, len(pieces), 4)),
+        np.array([merge_s]),
+        np.array([[from_s, station_m, speed_mps]]),
+        np.zeros(1, np.int64),
+    )
+    if examine(vehicles_of(book), change, from_s, bounds).code != ACCEPTED:
+        return False
+    write(book, row, pieces, merge_s, rules.road.mainline_speed_mps, rules.road.mainline_end_m)
+    return True
