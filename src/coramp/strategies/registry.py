@@ -8,7 +8,10 @@ from importlib import metadata
 
 from coramp.errors import CorampError
 from coramp.strategies.base import Strategy
+from coramp.strategies.dp_sequence import DpSequence
+from coramp.strategies.game import Game
 from coramp.strategies.mainline_priority import MainlinePriority
+from coramp.strategies.milp_sequence import MilpSequence
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.ramp_priority import RampPriority
 from coramp.strategies.uncontrolled import Uncontrolled
@@ -42,6 +45,9 @@ def register(strategy: type[Strategy], *, replace: bool = False) -> None:
 _OURS: tuple[type[Strategy], ...] = (
     MainlinePriority,
     RampPriority,
+    DpSequence,
+    MilpSequence,
+    Game,
     VirtualPlatoon,
     Ocbf,
     Uncontrolled,

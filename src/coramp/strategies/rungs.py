@@ -198,15 +198,28 @@ def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
 
 
 @kernel
-def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
+def delay(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    gap: int,
+    make_room: bool,
+    rules: Rules,
+) -> Merge:
     """Rung delay: slow down on the ramp at once so as to end at the front of a later gap.
 
     The subject passes the nose late, at the ramp's speed, and accelerates as in free movement.
-    Vehicles behind it on the ramp brake where they would come too near.
+    Vehicles behind it on the ramp brake where they would come too near. With ``make_room`` the
+    vehicle behind a gap that is too small falls back by what is missing, with its cascade.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
     target_m = min(high_m, situation.free_m)
-    if target_m < low_m:
+    back_m = max(0.0, low_m - target_m)
+    if back_m > 0.0 and (
+        not make_room
+        or gap == len(situation.order)
+        or target_m < unknown_bound_m(fleet, situation)
+    ):
         return no_merge()
     road, motion = rules.road, rules.motion
     v0 = road.mainline_speed_mps
@@ -233,10 +246,22 @@ def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rule
         return no_merge()
     if not delay_followers(fleet, proposal, situation, rules):
         return no_merge()
+    if not push_back(
+        fleet,
+        proposal,
+        situation.order,
+        gap,
+        situation.from_s,
+        situation.from_s,
+        merge_s,
+        back_m,
+        rules,
+    ):
+        return no_merge()
     unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
     if unsafe >= 0:
         return no_merge()
-    return Merge(gap, accel_mps2, merge_s, merge_m, 0.0)
+    return Merge(gap, accel_mps2, merge_s, merge_m, back_m)
 
 
 @kernel

@@ -1,0 +1,112 @@
+"""The order of merging as a mixed-integer linear program over a rolling horizon.
+
+Source: the formulation with big-M disjunctions that merging shares with single-machine scheduling,
+as in M. Karimi et al., Transp. Res. C 115, 2020, and the rolling horizon of DCMC, Sustainability
+17:7952, 2025. Solved by HiGHS.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.optimize import Bounds, LinearConstraint, milp
+
+from coramp._kernel import FloatArray
+from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.parameters import parameter
+from coramp.strategies.sequence import Crossings, decide_in_sequence
+
+
+@dataclass(frozen=True)
+class MilpSequence:
+    """The order with the least ``sum(t - t_min)`` of the vehicles in the horizon.
+
+    With h_ij what j must leave after i, and y_ij = 1 if i crosses first:
+    ``t_j - t_i >= h_ij - M (1 - y_ij)``, ``t_i - t_j >= h_ji - M y_ij`` for a lane vehicle i and a
+    ramp vehicle j; within a stream the order is kept. The horizon holds the subject, the ramp
+    vehicles behind it that come within ``horizon_s``, and the lane vehicles that cross from
+    ``horizon_s`` before the subject to ``horizon_s`` after the last of them.
+    """
+
+    name: ClassVar[str] = "milp-sequence"
+    summary: ClassVar[str] = "the order of merging by a mixed-integer program, rolling horizon"
+    cooperative: ClassVar[bool] = True
+
+    same_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h within a stream")
+    cross_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h between the streams")
+    horizon_s: float = parameter(4.0, 0.5, 20.0, meaning="how far around the subject is ordered")
+    ramp_vehicles: int = parameter(4, 1, 12, meaning="most ramp vehicles that are ordered at once")
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the decision for the first subject, in its place of the best order."""
+        return decide_in_sequence(self.vehicles_before, view, memory)
+
+    def vehicles_before(self, seen: Crossings) -> int:
+        """Returns how many lane vehicles cross before the subject in the best order."""
+        first, horizon = self.within_horizon(seen)
+        lane_s, ramp_s = self.crossing_times_s(horizon)
+        return first + int((lane_s < ramp_s[0]).sum())
+
+    def within_horizon(self, seen: Crossings) -> tuple[int, Crossings]:
+        """Returns how many lane vehicles go before the horizon, and who is in it."""
+        near = seen.ramp_s <= seen.ramp_s[0] + self.horizon_s
+        ramps = min(int(near.sum()), self.ramp_vehicles)
+        first = int((seen.mainline_s < seen.ramp_s[0] - self.horizon_s).sum())
+        last = int((seen.mainline_s <= seen.ramp_s[ramps - 1] + self.horizon_s).sum())
+        return first, Crossings(
+            seen.mainline_s[first:last],
+            seen.ramp_s[:ramps],
+            seen.mainline_next_s[first:last],
+            seen.ramp_next_s[:ramps],
+        )
+
+    def crossing_times_s(self, seen: Crossings) -> tuple[FloatArray, FloatArray]:
+        """Returns the best crossings (s) of lane and ramp vehicles."""
+        lanes, ramps = len(seen.mainline_s), len(seen.ramp_s)
+        if lanes == 0:
+            return seen.mainline_s, seen.ramp_s
+        earliest_s = np.concatenate([seen.mainline_s, seen.ramp_s])
+        next_s = np.concatenate([seen.mainline_next_s, seen.ramp_next_s])
+        origin_s = float(earliest_s.min())
+        big_m = float(earliest_s.max() - origin_s + np.sum(next_s)) + (lanes + ramps) * max(
+            self.same_stream_s, self.cross_stream_s
+        )
+        rows, bounds = self._constraints(lanes, ramps, next_s, 2.0 * big_m)
+        times = lanes + ramps
+        cost = np.concatenate([np.ones(times), np.zeros(lanes * ramps)])
+        low = np.concatenate([earliest_s - origin_s, np.zeros(lanes * ramps)])
+        high = np.concatenate([np.full(times, big_m), np.ones(lanes * ramps)])
+        found = milp(
+            cost,
+            integrality=np.concatenate([np.zeros(times), np.ones(lanes * ramps)]),
+            bounds=Bounds(low, high),
+            constraints=LinearConstraint(rows, bounds, np.inf),
+        )
+        crossing_s = found.x[:times] + origin_s
+        return crossing_s[:lanes], crossing_s[lanes:]
+
+    def _constraints(
+        self, lanes: int, ramps: int, next_s: FloatArray, big_m: float
+    ) -> tuple[FloatArray, FloatArray]:
+        same = np.maximum(next_s, self.same_stream_s)
+        cross = np.maximum(next_s, self.cross_stream_s)
+        times = lanes + ramps
+        rows, bounds = [], []
+
+        def ask(later: int, earlier: int, gap_s: float, binary: int, share: float) -> None:
+            row = np.zeros(times + lanes * ramps)
+            row[later], row[earlier] = 1.0, -1.0
+            if binary >= 0:
+                row[times + binary] = share
+            rows.append(row)
+            bounds.append(gap_s)
+
+        for k in range(times - 1):
+            if k != lanes - 1:
+                ask(k + 1, k, float(same[k]), -1, 0.0)
+        for i in range(lanes):
+            for j in range(ramps):
+                binary, ramp = i * ramps + j, lanes + j
+                ask(ramp, i, float(cross[i]) - big_m, binary, -big_m)
+                ask(i, ramp, float(cross[ramp]), binary, big_m)
+        return np.array(rows), np.array(bounds)

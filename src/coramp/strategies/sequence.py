@@ -1,0 +1,151 @@
+"""What strategies share that only choose an order of merging: what they see, and who drives it.
+
+Every vehicle counts by its crossing: the time at which one that cruises at v0 on its final place in
+the lane passes the nose, ``-intercept / v0``. A sequence strategy says in which gap of the lane
+order its subject goes; the trajectories are those of the ladder's rungs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from coramp._kernel import FloatArray, IntArray, kernel
+from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal
+from coramp.core.ramp_queue import next_behind_on_ramp
+from coramp.core.rules import Rules, unpacked
+from coramp.core.safe_distance import following_clearance_m, merge_clearance_m
+from coramp.core.trajectory import station_and_speed
+from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.feedback import place_on_mainline
+from coramp.strategies.ladder import decide_first, plan_of
+from coramp.strategies.rungs import create, delay, no_merge, reach
+from coramp.strategies.situation import (
+    RUNG_CREATE,
+    RUNG_DELAY,
+    RUNG_FREE,
+    RUNG_HOLD,
+    RUNG_REACH,
+    MergePlan,
+    assess,
+    conflict_position,
+    lane_order,
+    ramp_neighbours,
+)
+
+LATER_FIRST = 0.25
+"""Of two gaps as far from the chosen one, the later is tried first."""
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Who is to be put in order at a decision, as times (s) at which they would cross the nose.
+
+    ``mainline_s`` are those of the vehicles that are or will be in the lane, front first;
+    ``ramp_s`` those of ramp vehicles without a merge, the subject first and then who is behind it,
+    in free movement. ``mainline_next_s`` and ``ramp_next_s`` say how much later the next vehicle in
+    the lane may cross than each of them.
+    """
+
+    mainline_s: FloatArray
+    ramp_s: FloatArray
+    mainline_next_s: FloatArray
+    ramp_next_s: FloatArray
+
+
+Sequencer = Callable[[Crossings], int]
+"""Returns the number of lane vehicles that cross before the subject."""
+
+
+def crossings(fleet: Fleet, subject: int, from_s: float, rules: Rules) -> Crossings:
+    """Returns what a sequencer sees at ``from_s``."""
+    v0 = rules.road.mainline_speed_mps
+    order, intercepts_m = lane_order(fleet, subject, v0)
+    rows, ramp_s = ramp_crossings_s(fleet, subject, from_s, rules)
+    clearance_m = max(
+        merge_clearance_m(rules.road, rules.safety), following_clearance_m(rules.road, rules.safety)
+    )
+    return Crossings(
+        -intercepts_m / v0,
+        ramp_s,
+        (fleet.length_m[order] + clearance_m) / v0,
+        (fleet.length_m[rows] + clearance_m) / v0,
+    )
+
+
+@kernel
+def ramp_crossings_s(
+    fleet: Fleet, subject: int, from_s: float, rules: Rules
+) -> tuple[IntArray, FloatArray]:
+    """Returns the subject and those behind it on the ramp, and their crossings (s)."""
+    rows, crossing_s = np.empty(len(fleet.live), np.int64), np.empty(len(fleet.live))
+    row, n = subject, 0
+    while row >= 0:
+        station_m, speed_mps = station_and_speed(committed(fleet, row), from_s)
+        virtual_m, _ = place_on_mainline(station_m, speed_mps, rules)
+        rows[n], crossing_s[n] = row, from_s - virtual_m / rules.road.mainline_speed_mps
+        row, n = next_behind_on_ramp(fleet, row, from_s), n + 1
+    return rows[:n], crossing_s[:n]
+
+
+def decide_in_sequence(sequencer: Sequencer, view: View, memory: Memory) -> Decision:
+    """Returns the decision for the first subject, in the gap that the sequencer chooses.
+
+    If that cannot be driven, the gaps around it are tried, nearest first.
+    """
+
+    def planner(
+        fleet: Fleet, row: int, now_s: float, fastest_entry_mps: float, packed_rules: FloatArray
+    ) -> tuple[MergePlan, Proposal, bool, int]:
+        from_s = now_s + view.rules.control.actuation_delay_s
+        seen = crossings(fleet, row, from_s, view.rules)
+        gaps = gaps_around(sequencer(seen), len(seen.mainline_s) + 1)
+        return plan_in_gaps(fleet, row, now_s, fastest_entry_mps, gaps, packed_rules)
+
+    return decide_first(planner, view, memory)
+
+
+def gaps_around(chosen: int, count: int) -> IntArray:
+    """Returns all gap numbers, the chosen one first, then by distance from it."""
+    numbers = np.arange(count)
+    return np.argsort(np.abs(numbers - chosen - LATER_FIRST), kind="stable")
+
+
+@kernel
+def plan_in_gaps(
+    fleet: Fleet,
+    subject: int,
+    now_s: float,
+    fastest_entry_mps: float,
+    gaps: IntArray,
+    packed_rules: FloatArray,
+) -> tuple[MergePlan, Proposal, bool, int]:
+    """Returns the plan for the first of ``gaps`` in which the subject can merge.
+
+    In each it is tried to reach the gap as it is, to have who is behind it fall back, or both
+    vehicles or the front one move, and to come to it late, if need be with who is behind it falling
+    back. The rest is what ``ramp_neighbours`` tells.
+    """
+    rules = unpacked(packed_rules)
+    proposal = empty_proposal()
+    situation = assess(fleet, subject, now_s, fastest_entry_mps, rules)
+    conflict = conflict_position(fleet, situation, rules)
+    blocked, behind = ramp_neighbours(fleet, subject, now_s + rules.control.actuation_delay_s)
+    for gap in gaps:
+        rung, scenario, merge = RUNG_REACH, 0, reach(fleet, proposal, situation, gap, rules)
+        if merge.gap >= 0 and merge.accel_mps2 == situation.free_accel_mps2:
+            rung = RUNG_FREE
+        for moves in (2, 3, 1):
+            if merge.gap < 0:
+                rung, scenario = RUNG_CREATE, moves
+                merge = create(fleet, proposal, situation, gap, moves, rules)
+        for make_room in (False, True):
+            if merge.gap < 0:
+                rung, scenario = RUNG_DELAY, 2 if make_room else 0
+                merge = delay(fleet, proposal, situation, gap, make_room, rules)
+        if merge.gap >= 0:
+            plan = plan_of(fleet, proposal, situation, merge, rung, scenario, conflict, rules)
+            return plan, proposal, blocked, behind
+    proposal.size[0] = 0
+    plan = plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules)
+    return plan, proposal, blocked, behind
