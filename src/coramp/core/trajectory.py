@@ -230,6 +230,47 @@ def superpose_shift(
 
 
 @kernel
+def superpose(
+    pieces: FloatArray,
+    from_s: float,
+    start_s: float,
+    end_s: float,
+    extra_mps2: FloatArray,
+    out: FloatArray,
+) -> int:
+    """Writes the trajectory from ``from_s`` on, with accelerations added within a window.
+
+    The window's equal parts have one entry of ``extra_mps2`` each. Returns the new length, or 0 if
+    the pieces do not fit into ``out``. ``start_s`` must not lie before ``from_s``.
+    """
+    parts = len(extra_mps2)
+    if len(pieces) + parts + 2 > len(out):
+        return 0
+    station_m, speed_mps = station_and_speed(pieces, from_s)
+    n = begin(out, from_s, station_m, speed_mps)
+    k, part, now_s = piece_at(pieces, from_s), -1, from_s
+    while True:
+        part_end_s = math.inf
+        if part < parts:
+            part_end_s = start_s + (part + 1) * (end_s - start_s) / parts
+        next_s = min(piece_end_s(pieces, k), part_end_s)
+        accel_mps2 = pieces[k, ACCEL]
+        if 0 <= part < parts:
+            accel_mps2 += extra_mps2[part]
+        if math.isinf(next_s):
+            out[n - 1, ACCEL] = accel_mps2
+            break
+        n = drive(out, n, accel_mps2, next_s - now_s)
+        now_s = next_s
+        if next_s == part_end_s:
+            part += 1
+        while k + 1 < len(pieces) and pieces[k + 1, TIME] <= now_s:
+            k += 1
+    out[n - 1, SPEED] = pieces[len(pieces) - 1, SPEED]
+    return n
+
+
+@kernel
 def speed_range_mps(pieces: FloatArray, from_s: float) -> tuple[float, float]:
     """Returns the lowest and highest speed (m/s) from ``from_s`` on; the last piece must cruise."""
     _, lowest_mps = station_and_speed(pieces, from_s)

@@ -9,6 +9,7 @@ from importlib import metadata
 from coramp.errors import CorampError
 from coramp.strategies.base import Strategy
 from coramp.strategies.dp_sequence import DpSequence
+from coramp.strategies.fifo_optimal_control import FifoOptimalControl
 from coramp.strategies.game import Game
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.milp_sequence import MilpSequence
@@ -45,6 +46,7 @@ def register(strategy: type[Strategy], *, replace: bool = False) -> None:
 _OURS: tuple[type[Strategy], ...] = (
     MainlinePriority,
     RampPriority,
+    FifoOptimalControl,
     DpSequence,
     MilpSequence,
     Game,
