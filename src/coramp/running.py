@@ -165,7 +165,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:
         drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
-        outcome = run_uncontrolled(spec.scenario, drivers, spec.seed, options)
+        outcome = run_uncontrolled(spec.scenario, strategy, drivers, spec.seed, options)
     tables = tables_of(outcome, spec.scenario)
     row = {
         "run_id": spec.run_id,

@@ -58,7 +58,8 @@ class Ramp(Model):
     """The ramp, which ends at station 0, and the acceleration lane behind it.
 
     ``stop_station_m`` is where a vehicle stops that has no merge yet; left out, it is as near to
-    the nose as still lets it reach v0 in time from a stand.
+    the nose as still lets it reach v0 in time from a stand. ``detector_station_m`` is that of the
+    mainline's loop for ramp metering; left out, it is three quarters along the lane.
     """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
@@ -71,6 +72,7 @@ class Ramp(Model):
     merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
     decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0
     stop_station_m: Annotated[float, Field(lt=0.0)] | None = None
+    detector_station_m: Annotated[float, Field(gt=0.0)] | None = None
 
 
 class Vehicle(Model):
@@ -116,7 +118,7 @@ class Drivers(Model):
     """A population of ordinary drivers for uncontrolled runs, in SUMO's terms.
 
     ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and
-    v0 from there on.
+    v0 from there on. ``car_following`` is SUMO's model; ``sigma`` counts for Krauss alone.
     """
 
     wish: Literal["entry-speed", "free-flow"]
@@ -124,6 +126,7 @@ class Drivers(Model):
     tau_s: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
     min_gap_m: Annotated[float, Field(ge=0.0, le=20.0)] = 2.5
     lc_cooperative: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    car_following: Literal["Krauss", "IDM", "ACC", "CACC"] = "Krauss"
     integrator: Literal["euler", "ballistic"] = "euler"
 
 
@@ -216,6 +219,12 @@ class Scenario(Model):
         return min(NEAREST_STOP_M, -self.run_up_m - 0.1)
 
     @property
+    def detector_station_m(self) -> float:
+        """Station of the loop on the mainline beside the acceleration lane."""
+        given = self.ramp.detector_station_m
+        return 0.75 * self.ramp.acceleration_lane_m if given is None else given
+
+    @property
     def stop_mps2(self) -> float:
         """How hard (m/s2) a vehicle brakes towards a stop: comfortably, and as Eq. 3 allows.
 
@@ -281,6 +290,11 @@ def _place_problems(scenario: Scenario) -> list[str]:
         problems.append(
             f"mainline.end_m: {mainline.end_m:g} is not far enough beyond the acceleration lane; "
             f"allowed is at least {ramp.acceleration_lane_m + SHORTEST_EDGE_M:g} m"
+        )
+    if not scenario.detector_station_m <= ramp.acceleration_lane_m:
+        problems.append(
+            f"ramp.detector_station_m: {scenario.detector_station_m:g} is not beside the "
+            f"acceleration lane; allowed is up to {ramp.acceleration_lane_m:g} m"
         )
     if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
         problems.append(

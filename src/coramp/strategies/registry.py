@@ -8,6 +8,7 @@ from importlib import metadata
 
 from coramp.errors import CorampError
 from coramp.strategies.base import Strategy
+from coramp.strategies.alinea import Alinea
 from coramp.strategies.dp_sequence import DpSequence
 from coramp.strategies.fifo_optimal_control import FifoOptimalControl
 from coramp.strategies.game import Game
@@ -52,6 +53,7 @@ _OURS: tuple[type[Strategy], ...] = (
     Game,
     VirtualPlatoon,
     Ocbf,
+    Alinea,
     Uncontrolled,
 )
 for _strategy in _OURS:

@@ -63,9 +63,11 @@ def driver_routes(scenario: Scenario, drivers: Drivers, arrivals: Sequence[Arriv
 
 
 def _driver_type(name: str, drivers: Drivers, wish_mps: float, length_m: float) -> str:
+    model = drivers.car_following
+    noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (
         f'  <vType id="{name}" length="{length_m!r}" maxSpeed="{wish_mps!r}" speedFactor="1" '
-        f'speedDev="0" sigma="{drivers.sigma!r}" tau="{drivers.tau_s!r}" '
+        f'speedDev="0" {noise}tau="{drivers.tau_s!r}" '
         f'minGap="{drivers.min_gap_m!r}" lcCooperative="{drivers.lc_cooperative!r}"/>'
     )
 

@@ -24,17 +24,19 @@ from coramp.engines.outcomes import (
 )
 from coramp.engines.sumo.cooperative import CooperativePlant
 from coramp.engines.sumo.demand import cooperative_routes, driver_routes
+from coramp.engines.sumo.metering import Meter, loops
 from coramp.engines.sumo.network import RoadPlan, network_file, road_plan
 from coramp.engines.sumo.session import Session
 from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records import Outcome, Pieces
 from coramp.scenario import Drivers, Scenario
-from coramp.strategies.base import Strategy
+from coramp.strategies.base import Strategy, is_metered, period_of
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
+LOOPS = "loops.add.xml"
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
 
 
@@ -112,22 +114,30 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
 
 
 def run_uncontrolled(
-    scenario: Scenario, drivers: Drivers, seed: int, options: SumoOptions
+    scenario: Scenario, strategy: Strategy, drivers: Drivers, seed: int, options: SumoOptions
 ) -> Outcome:
-    """Returns what happened with SUMO's own drivers on the same arrivals."""
+    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not."""
     arrivals = arrivals_of(scenario, seed)
     ramp_limit_mps = scenario.ramp.speed_mps if drivers.wish == "free-flow" else None
-    plan = road_plan(scenario, ramp_limit_mps)
+    metered = is_metered(strategy)
+    plan = road_plan(scenario, ramp_limit_mps, metered)
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         files.write_routes(driver_routes(scenario, drivers, arrivals))
+        look_steps = round(LOOK_S / step_s)
+        if metered:
+            look_steps = max(1, round((period_of(strategy) or LOOK_S) / step_s))
+            files.write_loops(loops(scenario, look_steps * step_s))
         with Session(files.options(), step_s, options.gui) as session:
+            meter = Meter(session, scenario, strategy) if metered else None
             step = 0
             while step < cap_step and (step == 0 or session.vehicles_left()):
-                step = min(cap_step, step + round(LOOK_S / step_s))
+                step = min(cap_step, step + look_steps)
                 session.step_to(step)
+                if meter is not None:
+                    meter.decide(step * step_s)
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions = files.collisions()
@@ -197,6 +207,12 @@ class _Files:
     def write_routes(self, text: str) -> None:
         (self._folder / "routes.rou.xml").write_text(text)
 
+    def write_loops(self, text: str) -> None:
+        (self._folder / LOOPS).write_text(text)
+
+    def _loops(self, name: Path) -> list[str]:
+        return ["--additional-files", str(name)] if (self._folder / LOOPS).exists() else []
+
     def options(self) -> list[str]:
         """Returns SUMO's options, output files included."""
         folder = self._folder
@@ -205,6 +221,7 @@ class _Files:
             *("--route-files", str(folder / "routes.rou.xml")),
             *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
+            *self._loops(folder / LOOPS),
         ]
         if self._ballistic:
             result.append("--step-method.ballistic")
@@ -225,9 +242,12 @@ class _Files:
         shutil.copy(network_file(self._plan), self._keep_in / "net.net.xml")
         for name in ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml"):
             shutil.copy(self._folder / name, self._keep_in / name)
+        if self._loops(Path(LOOPS)):
+            shutil.copy(self._folder / LOOPS, self._keep_in / LOOPS)
         command = [
             *("sumo", "--net-file", "net.net.xml", "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
+            *self._loops(Path(LOOPS)),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *(("--step-method.ballistic",) if self._ballistic else ()),
         ]

@@ -43,6 +43,7 @@ class RoadPlan:
     mainline_limit_mps: float
     ramp_limit_mps: float
     merge_angle_deg: float
+    metered: bool = False
 
     def lane_lengths_m(self) -> dict[str, float]:
         """Returns the length that each lane must have."""
@@ -68,8 +69,13 @@ class RoadPlan:
         }
 
 
-def road_plan(scenario: Scenario, ramp_limit_mps: float | None = None) -> RoadPlan:
-    """Returns the plan of a scenario's road, with another speed limit on the ramp if given."""
+def road_plan(
+    scenario: Scenario, ramp_limit_mps: float | None = None, metered: bool = False
+) -> RoadPlan:
+    """Returns the plan of a scenario's road, with another speed limit on the ramp if given.
+
+    ``metered`` puts a signal at the nose.
+    """
     mainline, ramp = scenario.mainline, scenario.ramp
     return RoadPlan(
         mainline_m=-mainline.start_m,
@@ -79,6 +85,7 @@ def road_plan(scenario: Scenario, ramp_limit_mps: float | None = None) -> RoadPl
         mainline_limit_mps=mainline.limit_mps,
         ramp_limit_mps=ramp.limit_mps if ramp_limit_mps is None else ramp_limit_mps,
         merge_angle_deg=ramp.merge_angle_deg,
+        metered=metered,
     )
 
 
@@ -138,10 +145,11 @@ def ramp_shape_m(plan: RoadPlan) -> list[tuple[float, float]]:
 def _nodes(plan: RoadPlan) -> str:
     end_m = plan.acceleration_lane_m + plan.downstream_m
     (ramp_x, ramp_y), *_ = ramp_shape_m(plan)
+    nose = "traffic_light" if plan.metered else "unregulated"
     places = [
         ("west", -plan.mainline_m, 0.0, ""),
         ("rampstart", ramp_x, ramp_y, ""),
-        ("nose", 0.0, 0.0, ' type="unregulated" radius="0"'),
+        ("nose", 0.0, 0.0, f' type="{nose}" radius="0"'),
         ("end", plan.acceleration_lane_m, 0.0, ' type="unregulated" radius="0"'),
         ("east", end_m, 0.0, ""),
     ]

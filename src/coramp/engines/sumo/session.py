@@ -115,6 +115,20 @@ class Session:
         libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
         self._act_now(vehicle_id)
 
+    def set_ramp_signal(self, signal: str, lane: str, green: bool) -> None:
+        """Sets the links of a signal that come from ``lane``; all others stay green."""
+        links = libsumo.trafficlight.getControlledLinks(signal)
+        state = "".join("r" if not green and link[0][0] == lane else "G" for link in links)
+        libsumo.trafficlight.setRedYellowGreenState(signal, state)
+
+    def loop_occupancy(self, loop: str) -> float:
+        """Returns the share of its last period for which a loop was occupied."""
+        return float(libsumo.inductionloop.getLastIntervalOccupancy(loop)) / 100.0
+
+    def loop_count(self, loop: str) -> int:
+        """Returns how many vehicles passed a loop in its last period."""
+        return int(libsumo.inductionloop.getLastIntervalVehicleNumber(loop))
+
     def _act_now(self, vehicle_id: str) -> None:
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
 

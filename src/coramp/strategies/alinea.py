@@ -1,0 +1,105 @@
+"""Ramp metering: ALINEA at a signal before the acceleration lane, as road agencies run it.
+
+Source: M. Papageorgiou, H. Hadj-Salem, J.-M. Blosseville, "ALINEA: a local feedback control law for
+on-ramp metering", Transp. Res. Record 1320, 1991; queue override and bounds as in I. Papamichail,
+M. Papageorgiou et al., Transp. Res. Record 2178, 2010 (HERO).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from coramp.strategies.base import Decision, Detectors, Memory, ReleaseToDriver, SetRampSignal, View
+from coramp.strategies.parameters import parameter
+
+SECONDS_AN_HOUR = 3600.0
+
+
+class Metering(NamedTuple):
+    """What ALINEA remembers: its rate (veh/h), its next update, sums since the last, the signal."""
+
+    rate_veh_h: float
+    update_s: float
+    occupancy: float
+    queue: float
+    samples: int
+    green: bool
+    next_green_s: float
+
+
+@dataclass(frozen=True)
+class Alinea:
+    """The metered flow follows the occupancy of the mainline beside the acceleration lane.
+
+    ``q(k) = q(k-1) + K (o_target - o(k-1))``, q bounded each time, o in % over the last update
+    interval. While the detector at the ramp's upstream end is occupied for longer than its
+    threshold the ramp is let go (queue override). One vehicle a green: green until one has passed,
+    then red until ``3600 / q`` s after the last green began. At the highest rate it stays green.
+    """
+
+    name: ClassVar[str] = "alinea"
+    summary: ClassVar[str] = "ramp metering by a signal, with SUMO's own drivers"
+    cooperative: ClassVar[bool] = False
+    metered: ClassVar[bool] = True
+
+    target_occupancy_percent: float = parameter(
+        20.0, 1.0, 80.0, meaning="o_target, at the loop beside the acceleration lane"
+    )
+    gain_veh_h: float = parameter(70.0, 1.0, 1000.0, meaning="K, per % of occupancy")
+    update_s: float = parameter(30.0, 5.0, 300.0, meaning="time between two updates of the rate")
+    least_veh_h: float = parameter(240.0, 60.0, 3600.0, meaning="lowest rate")
+    most_veh_h: float = parameter(1200.0, 60.0, 3600.0, meaning="highest rate, then always green")
+    queue_occupancy_percent: float = parameter(
+        50.0, 1.0, 100.0, meaning="of the loop at the ramp's start; above it the ramp is let go"
+    )
+    period_s: float = parameter(1.0, 0.1, 2.0, meaning="clock of the signal")
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the release of subjects, or, once a period, the signal where it changes."""
+        if view.subjects or view.detectors is None:
+            return Decision(tuple(ReleaseToDriver(row) for row in view.subjects), (), memory)
+        seen, now_s = view.detectors, view.time_s
+        old = memory if isinstance(memory, Metering) else self.start(now_s)
+        state = self._updated(self._with_sample(old, seen), now_s)
+        state = self.with_signal(state, seen.passed_veh, now_s)
+        changed = state.green != old.green
+        return Decision((SetRampSignal(state.green),) if changed else (), (), state)
+
+    def start(self, now_s: float) -> Metering:
+        """Returns the state before the first sample: the ramp is let go."""
+        return Metering(self.most_veh_h, now_s + self.update_s, 0.0, 0.0, 0, True, now_s)
+
+    def next_rate_veh_h(self, rate_veh_h: float, occupancy_percent: float) -> float:
+        """Returns q(k) from q(k-1) and the occupancy (%) since."""
+        change = self.gain_veh_h * (self.target_occupancy_percent - occupancy_percent)
+        return min(self.most_veh_h, max(self.least_veh_h, rate_veh_h + change))
+
+    def with_signal(self, state: Metering, passed_veh: int, now_s: float) -> Metering:
+        """Returns the state with the signal as it is to be until the next period."""
+        if state.rate_veh_h >= self.most_veh_h:
+            return state._replace(green=True, next_green_s=now_s)
+        cycle_s = SECONDS_AN_HOUR / state.rate_veh_h
+        if state.green and passed_veh > 0:
+            green_again_s = state.next_green_s + cycle_s * passed_veh
+            return state._replace(green=False, next_green_s=max(now_s, green_again_s))
+        if not state.green and now_s >= state.next_green_s:
+            return state._replace(green=True, next_green_s=now_s)
+        return state
+
+    def _with_sample(self, state: Metering, seen: Detectors) -> Metering:
+        return state._replace(
+            occupancy=state.occupancy + seen.mainline_occupancy,
+            queue=state.queue + seen.queue_occupancy,
+            samples=state.samples + 1,
+        )
+
+    def _updated(self, state: Metering, now_s: float) -> Metering:
+        if now_s < state.update_s:
+            return state
+        occupancy_percent = 100.0 * state.occupancy / state.samples
+        queue_percent = 100.0 * state.queue / state.samples
+        rate = self.next_rate_veh_h(state.rate_veh_h, occupancy_percent)
+        if queue_percent > self.queue_occupancy_percent:
+            rate = self.most_veh_h
+        return state._replace(
+            rate_veh_h=rate, update_s=now_s + self.update_s, occupancy=0.0, queue=0.0, samples=0
+        )
