@@ -15,8 +15,9 @@ from coramp.metrics.schemas import TRAJECTORIES
 from coramp.metrics.tables import decisions_table
 from coramp.records import LANES
 from coramp.scenario import Scenario
-from coramp.strategies.base import period_of
 from coramp.snapshots import Snapshot, SnapshotVehicle
+from coramp.strategies.base import period_of
+from coramp.strategies.registry import strategy_named
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,10 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
     chosen = strategy_to_run(strategy)
     if period_of(chosen) is not None:
         raise CorampError(
-            f"strategy: {strategy} steers step by step and plans nothing ahead; choose a planning one"
+            f"strategy: {strategy} steers step by step and plans nothing ahead; "
+            "choose one that plans"
         )
-    if not chosen.cooperative:
+    if not strategy_named(strategy).cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     scenario = snapshot.road()
     vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))

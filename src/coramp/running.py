@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from coramp.coordination.guard import strategy_to_run
+from coramp.coordination.timed import PLANNING_TIMES, Timed
 from coramp.engines.exact.engine import run_exact
 from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
 from coramp.errors import CorampError
@@ -158,10 +159,11 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     """
     options = options or SumoOptions()
     started = time.perf_counter()
-    strategy = strategy_to_run(spec.strategy, spec.scenario.strategy.get(spec.strategy))
+    settings = spec.scenario.strategy.get(spec.strategy)
+    strategy = Timed(strategy_to_run(spec.strategy, settings))
     if spec.engine == "exact":
         outcome = run_exact(spec.scenario, strategy, spec.seed)
-    elif strategy.cooperative:
+    elif strategy_named(spec.strategy).cooperative:
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:
         drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
@@ -174,6 +176,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         "error": None,
         **tables.metrics,
         "wall_s": time.perf_counter() - started,
+        **strategy.planning_times(),
     }
     return tables, row
 
@@ -188,6 +191,7 @@ def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
         "error": error,
         **nothing,
         "wall_s": wall_s,
+        **dict.fromkeys(PLANNING_TIMES),
     }
 
 

@@ -368,7 +368,7 @@ def _clock_problems(scenario: Scenario) -> list[str]:
 
 
 def _strategy_problems(scenario: Scenario) -> list[str]:
-    problems = []
+    problems: list[str] = []
     for name, settings in scenario.strategy.items():
         try:
             found = strategy_named(name)

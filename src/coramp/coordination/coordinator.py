@@ -35,12 +35,12 @@ from coramp.core.fleet import proposed
 from coramp.core.rules import Rules, packed
 from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import (
+    Decider,
     Decision,
     DriveWithAcceleration,
     Explanation,
     FollowTrajectory,
     Memory,
-    Strategy,
     View,
     period_of,
 )
@@ -78,7 +78,7 @@ class Coordinator:
 
     def __init__(
         self,
-        strategy: Strategy,
+        strategy: Decider,
         rules: Rules,
         arrivals: Sequence[Arrival],
         fastest_entry_mps: float,
@@ -106,7 +106,7 @@ class Coordinator:
         self._period_steps = 0 if period_s is None else max(1, round(period_s / self._step_s))
 
     def expect_arrivals(self) -> None:
-        """Lets every arrival come at its step, and starts the strategy's own clock if it has one."""
+        """Lets every arrival come at its step, and starts the strategy's own clock, if any."""
         open_gate(self._gate)
         if self._period_steps:
             self._wake(self._period_steps, PERIOD)
@@ -278,7 +278,7 @@ class Coordinator:
         self.carry_out(decision, subjects, step)
 
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
-        """Commits what a decision commands, or its safe replacement, and notes its wake-up calls."""
+        """Commits what a decision commands, or what is safe instead, and notes its wakes."""
         time_s = step * self._step_s
         drives = [c for c in decision.commands if isinstance(c, DriveWithAcceleration)]
         if drives:

@@ -13,6 +13,7 @@ from coramp.core.fleet import MAX_CHANGED
 from coramp.core.trajectory import MAX_PIECES
 from coramp.errors import CorampError
 from coramp.strategies.base import (
+    Decider,
     Decision,
     DriveWithAcceleration,
     FollowTrajectory,
@@ -39,11 +40,8 @@ class TooLong(BaseException):
 class Guarded:
     """A strategy whose mistakes become a CorampError that names it, in one line."""
 
-    summary = ""
-
     def __init__(self, strategy: Strategy, longest_s: float = LONGEST_DECISION_S) -> None:
         self.name = strategy.name
-        self.cooperative = strategy.cooperative
         self.period_s = period_of(strategy)
         self.metered = is_metered(strategy)
         self._strategy = strategy
@@ -71,16 +69,16 @@ class Guarded:
         return decision
 
 
-def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Strategy:
+def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Decider:
     """Returns a strategy by name, with its parameters, guarded unless it is coramp's own.
 
     Raises CorampError if there is none such, or it cannot be made.
     """
     chosen: Any = strategy_named(name)
     if origin_of(name) == OURS:
-        return cast("Strategy", chosen(**(settings or {})))
+        return cast("Decider", chosen(**(settings or {})))
     try:
-        return cast("Strategy", Guarded(chosen(**(settings or {}))))
+        return Guarded(chosen(**(settings or {})))
     except Exception as error:
         raise CorampError(f"strategy {name}: raises {type(error).__name__}: {error}") from error
 

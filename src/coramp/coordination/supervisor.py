@@ -1,9 +1,9 @@
 """Keeps vehicles safe that are steered by acceleration: the safe fallback replaces what is not.
 
 A command is held for its time, and the checker is shown where that leads: a mainline vehicle that
-goes back to v0, a ramp vehicle that merges as in free movement or, where that is not safe yet, stops
-before the nose. What it lets pass is committed. What it refuses is not driven: the vehicle keeps its
-last commitment, which is safe to its end.
+goes back to v0, a ramp vehicle that merges as in free movement or, where that is not safe yet,
+stops before the nose. What it lets pass is committed. What it refuses is not driven: the vehicle
+keeps its last commitment, which is safe to its end.
 """
 
 import math
@@ -19,13 +19,13 @@ from coramp.coordination.book import Book, fleet_of, is_full
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
+from coramp.core.approach import stop_of_m
 from coramp.core.driving import hold_then_cruise, hold_then_merge, hold_then_stop
 from coramp.core.fleet import Fleet, committed
 from coramp.core.ramp_queue import next_ahead_on_ramp
-from coramp.core.approach import stop_of_m
 from coramp.core.rules import Rules, unpacked
 from coramp.core.safe_distance import merge_clearance_m, standing_clearance_m
-from coramp.core.trajectory import MAX_PIECES, STATION, TIME, cruise_intercept_m, station_and_speed
+from coramp.core.trajectory import MAX_PIECES, TIME, cruise_intercept_m, station_and_speed
 from coramp.strategies.base import DriveWithAcceleration
 from coramp.strategies.situation import foremost_unknown_m
 
@@ -110,7 +110,8 @@ def _drive_one(
     if merge or merge_s < math.inf:
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
-            if _commit_if_safe(book, row, out[:n], out[n - 1, TIME], from_s, rules, bounds):
+            change_s = _lane_change_s(out[:n], rules)
+            if _commit_if_safe(book, row, out[:n], change_s, from_s, rules, bounds):
                 return True
     if merge_s < math.inf:
         return False
@@ -120,9 +121,18 @@ def _drive_one(
 
 
 @kernel
-def _known_enough(
-    fleet: Fleet, row: int, pieces: FloatArray, known_m: float, rules: Rules
-) -> bool:
+def _lane_change_s(pieces: FloatArray, rules: Rules) -> float:
+    """Returns when a vehicle that ends at v0 changes lanes: at the next step of the clock.
+
+    That is when a simulator does. Others may be speeding up or braking then, and Eq. 15, 16 ask for
+    more or less with their speeds.
+    """
+    step_s = rules.control.step_s
+    return float(math.ceil(pieces[len(pieces) - 1, TIME] / step_s - 1e-6) * step_s)
+
+
+@kernel
+def _known_enough(fleet: Fleet, row: int, pieces: FloatArray, known_m: float, rules: Rules) -> bool:
     """Whether the merge lies ahead of everyone who may still enter the mainline."""
     end_m = cruise_intercept_m(pieces, rules.road.mainline_speed_mps)
     room_m = fleet.length_m[row] + merge_clearance_m(rules.road, rules.safety)
@@ -137,7 +147,8 @@ def _place_to_stop_m(fleet: Fleet, row: int, from_s: float, rules: Rules) -> flo
     if leader < 0:
         return stop_m
     standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
-    return min(stop_m, stop_of_m(committed(fleet, leader)) - fleet.length_m[leader] - standing_m)
+    behind_m = stop_of_m(committed(fleet, leader)) - fleet.length_m[leader] - standing_m
+    return float(min(stop_m, behind_m))
 
 
 @kernel

@@ -18,8 +18,8 @@ from coramp.core.trajectory import (
     begin,
     clip_end,
     drive,
-    station_and_speed,
     drive_to_speed,
+    station_and_speed,
     time_at_station,
 )
 
@@ -48,7 +48,12 @@ def drive_within_limit(
 
 @kernel
 def begin_hold(
-    out: FloatArray, before: FloatArray, from_s: float, accel_mps2: float, hold_s: float, limit: float
+    out: FloatArray,
+    before: FloatArray,
+    from_s: float,
+    accel_mps2: float,
+    hold_s: float,
+    limit: float,
 ) -> int:
     """Starts a trajectory that leaves ``before`` at ``from_s`` and holds an acceleration."""
     station_m, speed_mps = station_and_speed(before, from_s)
@@ -58,7 +63,12 @@ def begin_hold(
 
 @kernel
 def hold_then_cruise(
-    fleet: Fleet, row: int, accel_mps2: float, hold_s: float, from_s: float, rules: Rules,
+    fleet: Fleet,
+    row: int,
+    accel_mps2: float,
+    hold_s: float,
+    from_s: float,
+    rules: Rules,
     out: FloatArray,
 ) -> int:
     """Writes a mainline vehicle's way: hold, then back to v0."""
@@ -69,7 +79,12 @@ def hold_then_cruise(
 
 @kernel
 def hold_then_merge(
-    fleet: Fleet, row: int, accel_mps2: float, hold_s: float, from_s: float, rules: Rules,
+    fleet: Fleet,
+    row: int,
+    accel_mps2: float,
+    hold_s: float,
+    from_s: float,
+    rules: Rules,
     out: FloatArray,
 ) -> int:
     """Writes a ramp vehicle's way: hold, to the nose at v_R0, then up to v0; it merges at the end.
@@ -98,16 +113,20 @@ def hold_then_merge(
 
 @kernel
 def hold_then_stop(
-    fleet: Fleet, row: int, accel_mps2: float, hold_s: float, from_s: float, stop_m: float,
-    rules: Rules, out: FloatArray,
+    fleet: Fleet,
+    row: int,
+    accel_mps2: float,
+    hold_s: float,
+    from_s: float,
+    stop_m: float,
+    rules: Rules,
+    out: FloatArray,
 ) -> int:
     """Writes a ramp vehicle's way: hold, on at v_R0, and a stop at ``stop_m``.
 
     Returns 0 where it can no longer stop there.
     """
     road, motion = rules.road, rules.motion
-    n = begin_hold(
-        out, committed(fleet, row), from_s, accel_mps2, hold_s, road.ramp_limit_mps
-    )
+    n = begin_hold(out, committed(fleet, row), from_s, accel_mps2, hold_s, road.ramp_limit_mps)
     n = change_speed(out, n, road.ramp_speed_mps, motion)
     return append_stop(out, n, stop_m, motion.stop_mps2)

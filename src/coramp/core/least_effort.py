@@ -1,15 +1,19 @@
 """Motion with the least control effort between two states (Rios-Torres and Malikopoulos 2017).
 
 Minimising ``1/2 int u^2 dt`` under ``p' = v, v' = u`` gives ``u = a t + b``, so that
-``v = a t^2 / 2 + b t + c`` and ``p = a t^3 / 6 + b t^2 / 2 + c t + d``; the four constants follow from
-position and speed at both ends. Vehicles hold an acceleration over a period: what is driven is the
-solution of the same problem among accelerations that are constant over equal periods.
+``v = a t^2 / 2 + b t + c`` and ``p = a t^3 / 6 + b t^2 / 2 + c t + d``; the four constants follow
+from position and speed at both ends. Vehicles hold an acceleration over a period: what is driven is
+the solution of the same problem among accelerations that are constant over equal periods.
 """
 
+from typing import Any
+
 import numpy as np
-import quadprog
+import quadprog as untyped_quadprog
 
 from coramp._kernel import FloatArray
+
+quadprog: Any = untyped_quadprog
 
 ROUNDING = 1e-9
 
@@ -20,8 +24,8 @@ def coefficients(
     """Returns a (m/s3) and b (m/s2) of ``u = a t + b``, t from the start.
 
     With the mean acceleration ``m = (v_1 - v_0) / T`` and what it leaves of the way,
-    ``e = p - (v_0 + v_1) T / 2``: ``a = -12 e / T^3``, ``b = m + 6 e / T^2``. Raises ValueError for a
-    duration that is not positive.
+    ``e = p - (v_0 + v_1) T / 2``: ``a = -12 e / T^3``, ``b = m + 6 e / T^2``. Raises ValueError
+    for a duration that is not positive.
     """
     if duration_s <= 0.0:
         raise ValueError("duration must be positive")
@@ -36,7 +40,8 @@ def held_optimum(
     """Returns the least-effort accelerations (m/s2) among those held over equal periods.
 
     They lie on a line like ``u(t)``, at the middles of the periods; holding them moves the vehicle
-    ``1 - 1 / n^2`` of what the line's slope does, so the slope is larger by that. Needs two periods.
+    ``1 - 1 / n^2`` of what the line's slope does, so the slope is larger by that.
+    Needs two periods.
     """
     a, b = coefficients(distance_m, duration_s, start_mps, end_mps)
     middles_s = (np.arange(periods) + 0.5) * duration_s / periods - 0.5 * duration_s
@@ -92,11 +97,13 @@ def constrained_optimum(
     return solution
 
 
-def held_shift(shift_m: float, duration_s: float, periods: int, most_mps2: float) -> FloatArray | None:
+def held_shift(
+    shift_m: float, duration_s: float, periods: int, most_mps2: float
+) -> FloatArray | None:
     """Returns the accelerations (m/s2) to add for a shift at unchanged end speed, None if too far.
 
-    ``u = 6 shift / T^2 (1 - 2 t / T)``, on arcs of ``most_mps2`` at both ends where that binds. An even
-    number of periods.
+    ``u = 6 shift / T^2 (1 - 2 t / T)``, on arcs of ``most_mps2`` at both ends where that binds.
+    Needs an even number of periods.
     """
     period_s = duration_s / periods
     line = 1.0 - (2.0 * np.arange(periods) + 1.0) / periods

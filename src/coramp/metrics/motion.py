@@ -9,6 +9,7 @@ from coramp.core.fuel import trajectory_fuel_l
 from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_end_s
 
 BIN_S = 1.0
+JERK_GRID_S = 0.1
 
 
 @kernel
@@ -74,6 +75,33 @@ def hardest_braking_mps2(rows: FloatArray) -> float:
     for k in range(len(rows)):
         hardest = max(hardest, -rows[k, ACCEL])
     return hardest
+
+
+@kernel
+def largest_jerk_mps3(first: IntArray, rows: FloatArray, until_s: FloatArray) -> float:
+    """Returns the largest change of acceleration (m/s3) of all vehicles, over 1 s.
+
+    ``|v(t + 1) - 2 v(t) + v(t - 1)| / (1 s)^2``, at the times of a grid: accelerations that jump,
+    as planned and commanded ones do, have no other finite jerk.
+    """
+    largest = 0.0
+    lag = round(1.0 / JERK_GRID_S)
+    for i in range(len(until_s)):
+        pieces = rows[first[i] : first[i + 1]]
+        if len(pieces) == 0 or not until_s[i] > pieces[0, TIME]:
+            continue
+        count = int((until_s[i] - pieces[0, TIME]) / JERK_GRID_S) + 1
+        speeds_mps = np.empty(count)
+        k = 0
+        for j in range(count):
+            now_s = pieces[0, TIME] + j * JERK_GRID_S
+            while k + 1 < len(pieces) and pieces[k + 1, TIME] <= now_s:
+                k += 1
+            speeds_mps[j] = pieces[k, SPEED] + pieces[k, ACCEL] * (now_s - pieces[k, TIME])
+        for j in range(lag, count - lag):
+            second = speeds_mps[j + lag] - 2.0 * speeds_mps[j] + speeds_mps[j - lag]
+            largest = max(largest, abs(second))
+    return largest
 
 
 def pieces_of_samples(

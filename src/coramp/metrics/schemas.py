@@ -113,6 +113,7 @@ RUN_METRICS: Schema = {
     "rung_hold": pl.Int64,
     "refused_plans": pl.Int64,
     "interventions": pl.Int64,
+    "max_jerk_mps3": pl.Float64,
 }
 
 RUNS: Schema = {
@@ -123,6 +124,8 @@ RUNS: Schema = {
     "error": pl.String,
     **RUN_METRICS,
     "wall_s": pl.Float64,
+    "planning_median_s": pl.Float64,
+    "planning_p95_s": pl.Float64,
 }
 
 STREAMS: Schema = {

@@ -13,7 +13,13 @@ from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
 from coramp.metrics.fitting import fitted_pieces
-from coramp.metrics.motion import BIN_S, binned_motion, fuel_of_each_l, hardest_braking_mps2
+from coramp.metrics.motion import (
+    BIN_S,
+    binned_motion,
+    fuel_of_each_l,
+    hardest_braking_mps2,
+    largest_jerk_mps3,
+)
 from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS, Schema
 from coramp.metrics.separations import (
     DRAC,
@@ -294,8 +300,15 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
         "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
         "max_severity": float(mainline[SEVERITY]),
         "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
+        "max_jerk_mps3": _largest_jerk_mps3(outcome),
         "plan_error_m": _largest(outcome.passages.plan_error_m),
     }
+
+
+def _largest_jerk_mps3(outcome: Outcome) -> float:
+    passages, pieces = outcome.passages, outcome.pieces
+    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
+    return float(largest_jerk_mps3(pieces.first, pieces.rows, until_s))
 
 
 def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:

@@ -164,7 +164,15 @@ class Decision:
     explanations: tuple[Explanation, ...] = field(default=())
 
 
-class Strategy(Protocol):
+class Decider(Protocol):
+    """Whatever answers like a strategy."""
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the decision for ``view.subjects``; must not change the view."""
+        ...
+
+
+class Strategy(Decider, Protocol):
     """Who yields to whom.
 
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
@@ -176,16 +184,12 @@ class Strategy(Protocol):
     summary: ClassVar[str]
     cooperative: ClassVar[bool]
 
-    def decide(self, view: View, memory: Memory) -> Decision:
-        """Returns the decision for ``view.subjects``; must not change the view."""
-        ...
 
-
-def period_of(strategy: Strategy) -> float | None:
+def period_of(strategy: Decider) -> float | None:
     """Returns in which period (s) a strategy is woken besides, None for one that only plans."""
     return getattr(strategy, "period_s", None)
 
 
-def is_metered(strategy: Strategy | type[Strategy]) -> bool:
+def is_metered(strategy: Decider) -> bool:
     """Returns whether a strategy needs a signal and detectors at the ramp."""
     return bool(getattr(strategy, "metered", False))

@@ -62,8 +62,9 @@ class DpSequence:
                     if (n if next_ramp else m) >= (ramps if next_ramp else lanes):
                         continue
                     key = (m + (not next_ramp), n + next_ramp, next_ramp)
-                    grown = [self._with_next(seen, label, m, n, by_ramp, next_ramp)
-                             for label in labels]
+                    grown = [
+                        self._with_next(seen, label, m, n, by_ramp, next_ramp) for label in labels
+                    ]
                     reached[key] = not_dominated(reached.get(key, []) + grown)
             states = reached
         ends = [label for labels in states.values() for label in labels]

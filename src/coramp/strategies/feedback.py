@@ -56,7 +56,13 @@ def virtual_platoon(fleet: Fleet, at_s: float, packed_rules: FloatArray) -> Plat
         numbers[0, k], numbers[1, k], numbers[2, k] = station_m, speed_mps, fleet.length_m[row]
         numbers[3, k], numbers[4, k] = at_m, at_mps
     return Platoon(
-        rows, stage, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4],
+        rows,
+        stage,
+        numbers[0],
+        numbers[1],
+        numbers[2],
+        numbers[3],
+        numbers[4],
         _next_on_same_road(stage),
     )
 

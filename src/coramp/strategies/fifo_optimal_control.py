@@ -54,10 +54,11 @@ class FifoOptimalControl:
     """Vehicles merge in the order in which they would in free movement, with the least effort.
 
     The merge times follow one another: ``t_i = max(t_i free, t_(i-1) + h)`` with h from the safe
-    distance. Each trajectory to its merge minimises ``1/2 int u^2 dt`` (``core.least_effort``): of the
-    ramp vehicle from its decision to ``merge_station_m`` or the lane's end if that is nearer, at v0;
-    of a lane vehicle that falls back, between the decision and that merge. Where such a trajectory
-    comes too near to another vehicle, that of the ladder's rungs in the same place is taken.
+    distance. Each trajectory to its merge minimises ``1/2 int u^2 dt`` (``core.least_effort``):
+    that of the ramp vehicle from its decision to ``merge_station_m``, or the lane's end if that is
+    nearer, at v0; that of a lane vehicle that falls back, between the decision and that merge.
+    Where such a trajectory comes too near to another vehicle, that of the ladder's rungs in the
+    same place is taken.
     """
 
     name: ClassVar[str] = "fifo-optimal-control"

@@ -6,15 +6,17 @@ as in M. Karimi et al., Transp. Res. C 115, 2020, and the rolling horizon of DCM
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
+import scipy.optimize as untyped_optimize
 
 from coramp._kernel import FloatArray
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.parameters import parameter
 from coramp.strategies.sequence import Crossings, decide_in_sequence
+
+optimize: Any = untyped_optimize
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,11 @@ class MilpSequence:
         cost = np.concatenate([np.ones(times), np.zeros(lanes * ramps)])
         low = np.concatenate([earliest_s - origin_s, np.zeros(lanes * ramps)])
         high = np.concatenate([np.full(times, big_m), np.ones(lanes * ramps)])
-        found = milp(
+        found = optimize.milp(
             cost,
             integrality=np.concatenate([np.zeros(times), np.ones(lanes * ramps)]),
-            bounds=Bounds(low, high),
-            constraints=LinearConstraint(rows, bounds, np.inf),
+            bounds=optimize.Bounds(low, high),
+            constraints=optimize.LinearConstraint(rows, bounds, np.inf),
         )
         crossing_s = found.x[:times] + origin_s
         return crossing_s[:lanes], crossing_s[lanes:]

@@ -6,10 +6,10 @@ W. Xiao, C. Belta, C. G. Cassandras, arXiv 1809.07916.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import quadprog
+import quadprog as untyped_quadprog
 
 from coramp._kernel import FloatArray
 from coramp.core.rules import Rules
@@ -18,7 +18,7 @@ from coramp.strategies.feedback import MAINLINE, Platoon, virtual_platoon
 from coramp.strategies.parameters import parameter
 from coramp.strategies.virtual_platoon import drive_commands
 
-
+quadprog: Any = untyped_quadprog
 SLACK_MPS2 = 1e-6
 """Between bounds that coincide, so that rounding does not make a problem without solution."""
 
@@ -78,9 +78,7 @@ class Ocbf:
         limits = self.limits(platoon, rules)
         return self._solved(platoon.speed_mps - wish_mps, reference, limits)
 
-    def reference_mps2(
-        self, platoon: Platoon, wish_mps: FloatArray, rules: Rules
-    ) -> FloatArray:
+    def reference_mps2(self, platoon: Platoon, wish_mps: FloatArray, rules: Rules) -> FloatArray:
         """Returns u(0) of the optimum without constraints, end speed free, to the merge.
 
         ``u(t) = 3 (D - v T) (T - t) / T^3`` minimises the effort to drive D in T, and T minimises
@@ -96,7 +94,10 @@ class Ocbf:
             middle_s = 0.5 * (low_s + high_s)
             left_m = way_m - speed_mps * middle_s
             too_fast = 1.5 * left_m * (2.0 * way_m + left_m) > beta * middle_s**4
-            low_s, high_s = np.where(too_fast, middle_s, low_s), np.where(too_fast, high_s, middle_s)
+            low_s, high_s = (
+                np.where(too_fast, middle_s, low_s),
+                np.where(too_fast, high_s, middle_s),
+            )
         towards = 3.0 * (way_m - speed_mps * high_s) / high_s**2
         keeping = self.speed_rate_ps * (wish_mps - platoon.speed_mps)
         reference = np.where(platoon.station_m < -1.0, towards, keeping)
@@ -154,9 +155,7 @@ class Ocbf:
         other_road = platoon.same_lane != np.arange(len(x)) - 1
         return np.where(other_road, allowed, np.inf)
 
-    def _solved(
-        self, excess_mps: FloatArray, reference: FloatArray, limits: Limits
-    ) -> FloatArray:
+    def _solved(self, excess_mps: FloatArray, reference: FloatArray, limits: Limits) -> FloatArray:
         weights = np.diag([1.0, self.relaxation_weight])
         rows = np.array([[0.0, -1.0, 1.0], [1.0, 0.0, 0.0]])
         bounds = np.zeros(3)

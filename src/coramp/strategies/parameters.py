@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
-from typing import Any
+from typing import Any, cast
 
 Value = float | int | str | bool
 
@@ -37,7 +37,7 @@ class Parameter:
 def parameters_of(strategy: type) -> list[Parameter]:
     """Returns what a strategy can be told, in the order of its fields."""
     return [
-        Parameter(f.name, f.default, _allowed(f), str(f.metadata.get("meaning", "")))
+        Parameter(f.name, cast("Value", f.default), _allowed(f), str(f.metadata.get("meaning", "")))
         for f in _settable(strategy)
     ]
 
@@ -59,7 +59,9 @@ def _wrong(known: Mapping[str, Field[Any]], key: str, value: Any) -> str:
         names = ", ".join(known) or "none: the strategy has no parameters"
         return f"{key}: there is no such parameter; allowed are {names}"
     asked = known[key]
-    return "" if _fits(asked, value) else f"{key}: {value!r} cannot be; allowed is {_allowed(asked)}"
+    return (
+        "" if _fits(asked, value) else f"{key}: {value!r} cannot be; allowed is {_allowed(asked)}"
+    )
 
 
 def _fits(asked: Field[Any], value: Any) -> bool:

@@ -7,8 +7,8 @@ from functools import cache
 from importlib import metadata
 
 from coramp.errors import CorampError
-from coramp.strategies.base import Strategy
 from coramp.strategies.alinea import Alinea
+from coramp.strategies.base import Strategy
 from coramp.strategies.dp_sequence import DpSequence
 from coramp.strategies.fifo_optimal_control import FifoOptimalControl
 from coramp.strategies.game import Game

@@ -216,9 +216,7 @@ def delay(
     target_m = min(high_m, situation.free_m)
     back_m = max(0.0, low_m - target_m)
     if back_m > 0.0 and (
-        not make_room
-        or gap == len(situation.order)
-        or target_m < unknown_bound_m(fleet, situation)
+        not make_room or gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
     ):
         return no_merge()
     road, motion = rules.road, rules.motion

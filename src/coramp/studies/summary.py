@@ -1,32 +1,35 @@
 """The tables that sum up a study, from its runs alone."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import polars as pl
 
 from coramp.running import broken_promises
+from coramp.studies.baseline_layout import baseline_tables
 from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
+from coramp.studies.field_layout import field_tables
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 
+LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
+    "paper": paper_tables,
+    "sensitivity": sensitivity_tables,
+    "capacity": capacity_tables,
+    "field": field_tables,
+    "baseline": baseline_tables,
+}
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
 
 def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
     """Returns a study's tables: those of its layout, then every group of runs, then promises."""
     good = runs.filter(status="ok")
-    tables: list[Table] = []
-    if study.layout == "paper":
-        tables += paper_tables(good)
-    if study.layout == "sensitivity":
-        tables += sensitivity_tables(good)
-    if study.layout == "capacity":
-        tables += capacity_tables(good)
-    return [*tables, overview(good), promises(runs)]
+    make = LAYOUTS.get(study.layout)
+    return [*(make(good) if make is not None else ()), overview(good), promises(runs)]
 
 
 def overview(good: pl.DataFrame) -> Table:

@@ -7,10 +7,10 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.engines.outcomes import cap_step_of, cooperative_outcome, step_after_last_exit
 from coramp.records import Outcome
 from coramp.scenario import Scenario
-from coramp.strategies.base import Strategy
+from coramp.strategies.base import Decider
 
 
-def run_exact(scenario: Scenario, strategy: Strategy, seed: int) -> Outcome:
+def run_exact(scenario: Scenario, strategy: Decider, seed: int) -> Outcome:
     """Returns what happens with cooperative vehicles under a strategy.
 
     Arrivals, decisions and commitments are those of a run in SUMO; only the tracking error of the

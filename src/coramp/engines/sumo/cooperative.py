@@ -23,7 +23,7 @@ CORRECT_FROM_M = 0.015
 SAME_SPEED_MPS = 1e-6
 CORRECTION_S = 0.5
 """Half of the time that bringing it back takes, if no knot is nearer."""
-BEFORE_EXIT_S = 0.01
+BEFORE_EXIT_M = 0.2
 """A vehicle this close to the zone's end is left alone: SUMO may have taken it off the road."""
 
 
@@ -105,10 +105,10 @@ class CooperativePlant:
     def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
         """Makes a vehicle follow the pieces from their first time on."""
         vehicle = self.vehicles[row]
-        exit_s = time_at_station(pieces, self._exit_m)
+        exit_s = time_at_station(pieces, self._exit_m - BEFORE_EXIT_M)
         last = math.inf
         if exit_s < math.inf:
-            last = math.floor((exit_s - BEFORE_EXIT_S) / self._step_s)
+            last = math.ceil(exit_s / self._step_s - ON_GRID) - 1
         first = round(pieces[0, TIME] / self._step_s)
         commands = self._commands(pieces, first, last)
         if vehicle.following is not None:

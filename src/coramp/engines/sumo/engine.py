@@ -31,7 +31,7 @@ from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records import Outcome, Pieces
 from coramp.scenario import Drivers, Scenario
-from coramp.strategies.base import Strategy, is_metered, period_of
+from coramp.strategies.base import Decider, is_metered, period_of
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
@@ -63,7 +63,7 @@ class SumoOptions:
 
 
 def run_cooperative(
-    scenario: Scenario, strategy: Strategy, seed: int, options: SumoOptions
+    scenario: Scenario, strategy: Decider, seed: int, options: SumoOptions
 ) -> Outcome:
     """Returns what happened with cooperative vehicles under a strategy.
 
@@ -114,7 +114,7 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
 
 
 def run_uncontrolled(
-    scenario: Scenario, strategy: Strategy, drivers: Drivers, seed: int, options: SumoOptions
+    scenario: Scenario, strategy: Decider, drivers: Drivers, seed: int, options: SumoOptions
 ) -> Outcome:
     """Returns what happened with SUMO's own drivers on the same arrivals, metered or not."""
     arrivals = arrivals_of(scenario, seed)

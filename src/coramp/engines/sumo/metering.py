@@ -6,7 +6,7 @@ from coramp.coordination.ledger import Ledger
 from coramp.core.rules import packed
 from coramp.engines.sumo.session import Session
 from coramp.scenario import Scenario
-from coramp.strategies.base import Detectors, Memory, Reports, SetRampSignal, Strategy, View
+from coramp.strategies.base import Decider, Detectors, Memory, Reports, SetRampSignal, View
 
 MAINLINE_LOOP, QUEUE_LOOP, PASSAGE_LOOP = "mainline", "queue", "passage"
 QUEUE_LOOP_M = 20.0
@@ -16,7 +16,7 @@ SIGNAL = "nose"
 
 
 def loops(scenario: Scenario, period_s: float) -> str:
-    """Returns SUMO's file of loops: beside the acceleration lane, at the ramp's start, at its end."""
+    """Returns SUMO's file of loops: beside the acceleration lane, at the ramp's start and end."""
     places = (
         (MAINLINE_LOOP, "merge_1", scenario.detector_station_m),
         (QUEUE_LOOP, "ramp_0", min(QUEUE_LOOP_M, -0.25 * scenario.ramp.start_m)),
@@ -33,7 +33,7 @@ def loops(scenario: Scenario, period_s: float) -> str:
 class Meter:
     """Asks a strategy once a period, with what the loops tell, and sets the signal."""
 
-    def __init__(self, session: Session, scenario: Scenario, strategy: Strategy) -> None:
+    def __init__(self, session: Session, scenario: Scenario, strategy: Decider) -> None:
         self._session = session
         self._strategy = strategy
         self._memory: Memory = None

@@ -1,0 +1,34 @@
+"""How long a strategy takes to decide."""
+
+import time
+from statistics import quantiles
+
+from coramp.strategies.base import Decider, Decision, Memory, View, is_metered, period_of
+
+PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
+
+
+class Timed:
+    """A strategy, and the wall time of each of its decisions."""
+
+    def __init__(self, strategy: Decider) -> None:
+        self.period_s = period_of(strategy)
+        self.metered = is_metered(strategy)
+        self._strategy = strategy
+        self._taken_s: list[float] = []
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns what the strategy decides."""
+        started = time.perf_counter()
+        try:
+            return self._strategy.decide(view, memory)
+        finally:
+            self._taken_s.append(time.perf_counter() - started)
+
+    def planning_times(self) -> dict[str, float | None]:
+        """Returns median and 95th percentile (s) of a decision; None where there was none."""
+        if len(self._taken_s) < 2:
+            only = self._taken_s[0] if self._taken_s else None
+            return dict.fromkeys(PLANNING_TIMES, only)
+        cuts = quantiles(self._taken_s, n=20, method="inclusive")
+        return {"planning_median_s": cuts[9], "planning_p95_s": cuts[18]}
