@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from coramp.coordination.guard import strategy_to_run
-from coramp.coordination.timed import PLANNING_TIMES, Timed
+from coramp.coordination.timed import Timed
 from coramp.engines.exact.engine import run_exact
 from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
 from coramp.errors import CorampError
 from coramp.loading import drivers_checked, load_scenario
-from coramp.metrics.schemas import RESULT_VERSION, RUN_METRICS
+from coramp.metrics.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS
 from coramp.metrics.tables import Row, RunTables, tables_of
 from coramp.scenario import Scenario
 from coramp.strategies.registry import strategy_named
@@ -176,7 +176,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         "error": None,
         **tables.metrics,
         "wall_s": time.perf_counter() - started,
-        **strategy.planning_times(),
+        **dict(zip(PLANNING_TIMES, strategy.planning_times_s(), strict=True)),
     }
     return tables, row
 

@@ -23,6 +23,8 @@ DIMENSIONLESS = {
     "mass_ratio",
     "log10_mass_ratio",
     "speed_deviation",
+    "mainline_occupancy",
+    "queue_occupancy",
 }
 GENERIC = {"constant", "slope", "curvature", "duration"}
 """Of ``smallest_of_quadratic``, which knows no units."""

@@ -17,11 +17,14 @@ from coramp.run_folder import run_content
 from coramp.running import make_spec
 from coramp.scenario import Scenario
 from coramp.snapshots import Snapshot
+from coramp.strategies.parameters import parameters_of
+from coramp.strategies.registry import strategies
 from coramp.studies.definition import Study
 
 PAGE = Path(__file__).parents[2] / "docs" / "symbols.md"
 UNITS = {
     "veh_h": "veh/h",
+    "mps3": "m/s3",
     "mps2": "m/s2",
     "mps": "m/s",
     "deg": "deg",
@@ -112,6 +115,17 @@ def functions_that_cite():
 @pytest.mark.parametrize("file", FILES)
 def test_every_column_of_a_file_stands_there_once_and_in_order(file):
     assert names(file) == list(FILES[file])
+
+
+def test_every_parameter_of_a_strategy_stands_there_as_it_is():
+    found = [
+        (f"{name}.{p.name}", f"{p.default:g}", p.allowed, p.meaning)
+        for name, strategy in strategies().items()
+        for p in parameters_of(strategy)
+    ]
+    written = [tuple(v.strip("`") for v in row.values()) for row in TABLES["Strategy parameters"]]
+    assert written == found
+    assert all(meaning for *_, meaning in found)
 
 
 def test_every_key_of_run_json_stands_there():

@@ -20,9 +20,22 @@ def test_everything_that_is_built_in_is_listed_and_described():
 
 def test_what_the_design_promises_is_built_in():
     assert {"paper", "expressway"} <= set(builtin_names("scenarios"))
-    assert {"paper", "sensitivity"} <= set(builtin_names("studies"))
+    assert {"paper", "sensitivity", "capacity", "field", "baseline"} <= set(
+        builtin_names("studies")
+    )
     assert "example" in builtin_names("snapshots")
-    assert list(strategies()) == ["mainline-priority", "ramp-priority", "uncontrolled"]
+    assert list(strategies()) == [
+        "mainline-priority",
+        "ramp-priority",
+        "fifo-optimal-control",
+        "dp-sequence",
+        "milp-sequence",
+        "game",
+        "virtual-platoon",
+        "ocbf",
+        "alinea",
+        "uncontrolled",
+    ]
 
 
 @pytest.mark.parametrize("command", ["scenarios", "strategies"])

@@ -2,7 +2,7 @@
 
 import polars as pl
 
-from coramp.metrics.schemas import RUN_METRICS, RUNS
+from coramp.metrics.schemas import MEASURED, RUN_METRICS, RUNS
 
 GRID = """
 name = "grid"
@@ -61,4 +61,4 @@ def runs_of(*rows):
 
 def apart_from_time(frame):
     """Returns a table of runs without the time that they took."""
-    return frame.drop("wall_s")
+    return frame.drop(MEASURED)

@@ -5,8 +5,6 @@ from statistics import quantiles
 
 from coramp.strategies.base import Decider, Decision, Memory, View, is_metered, period_of
 
-PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
-
 
 class Timed:
     """A strategy, and the wall time of each of its decisions."""
@@ -25,10 +23,10 @@ class Timed:
         finally:
             self._taken_s.append(time.perf_counter() - started)
 
-    def planning_times(self) -> dict[str, float | None]:
+    def planning_times_s(self) -> tuple[float | None, float | None]:
         """Returns median and 95th percentile (s) of a decision; None where there was none."""
         if len(self._taken_s) < 2:
             only = self._taken_s[0] if self._taken_s else None
-            return dict.fromkeys(PLANNING_TIMES, only)
+            return only, only
         cuts = quantiles(self._taken_s, n=20, method="inclusive")
-        return {"planning_median_s": cuts[9], "planning_p95_s": cuts[18]}
+        return cuts[9], cuts[18]

@@ -53,12 +53,12 @@ def begin_hold(
     from_s: float,
     accel_mps2: float,
     hold_s: float,
-    limit: float,
+    limit_mps: float,
 ) -> int:
     """Starts a trajectory that leaves ``before`` at ``from_s`` and holds an acceleration."""
     station_m, speed_mps = station_and_speed(before, from_s)
     n = begin(out, from_s, station_m, speed_mps)
-    return drive_within_limit(out, n, accel_mps2, hold_s, limit)
+    return drive_within_limit(out, n, accel_mps2, hold_s, limit_mps)
 
 
 @kernel
@@ -90,7 +90,7 @@ def hold_then_merge(
     """Writes a ramp vehicle's way: hold, to the nose at v_R0, then up to v0; it merges at the end.
 
     On the acceleration lane it takes free movement's acceleration, or more if the lane's end asks
-    for it (Eq. 21). Returns 0 where no allowed acceleration is enough.
+    for it. Returns 0 where no allowed acceleration is enough.
     """
     road, motion = rules.road, rules.motion
     before = committed(fleet, row)

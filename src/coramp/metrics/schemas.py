@@ -127,6 +127,9 @@ RUNS: Schema = {
     "planning_median_s": pl.Float64,
     "planning_p95_s": pl.Float64,
 }
+PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
+MEASURED = ("wall_s", *PLANNING_TIMES)
+"""Columns that hold wall times: all that differs between equal runs."""
 
 STREAMS: Schema = {
     "run_id": pl.String,

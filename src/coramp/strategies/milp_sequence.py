@@ -84,6 +84,8 @@ class MilpSequence:
             bounds=optimize.Bounds(low, high),
             constraints=optimize.LinearConstraint(rows, bounds, np.inf),
         )
+        if found.x is None:
+            raise ValueError(f"the order of merging has no solution: {found.message}")
         crossing_s = found.x[:times] + origin_s
         return crossing_s[:lanes], crossing_s[lanes:]
 

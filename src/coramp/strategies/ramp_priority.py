@@ -117,7 +117,7 @@ def first_that_helps(
             fleet, proposal, situation, merge, RUNG_CREATE, scenario, conflict, rules
         ), proposal
     for gap in range(len(situation.order) + 1):
-        merge = delay(fleet, proposal, situation, gap, False, rules)
+        merge = delay(fleet, proposal, situation, gap, rules)
         if merge.gap >= 0:
             return plan_of(
                 fleet, proposal, situation, merge, RUNG_DELAY, 0, conflict, rules

@@ -198,7 +198,13 @@ def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
 
 
 @kernel
-def delay(
+def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
+    """Rung delay: come late to a later gap that is large enough, as ``come_late`` does."""
+    return come_late(fleet, proposal, situation, gap, False, rules)
+
+
+@kernel
+def come_late(
     fleet: Fleet,
     proposal: Proposal,
     situation: Situation,
@@ -206,7 +212,7 @@ def delay(
     make_room: bool,
     rules: Rules,
 ) -> Merge:
-    """Rung delay: slow down on the ramp at once so as to end at the front of a later gap.
+    """Slow down on the ramp at once so as to end at the front of a later gap.
 
     The subject passes the nose late, at the ramp's speed, and accelerates as in free movement.
     Vehicles behind it on the ramp brake where they would come too near. With ``make_room`` the

@@ -19,7 +19,7 @@ from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.feedback import place_on_mainline
 from coramp.strategies.ladder import decide_first, plan_of
-from coramp.strategies.rungs import create, delay, no_merge, reach
+from coramp.strategies.rungs import come_late, create, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,
@@ -43,8 +43,8 @@ class Crossings:
 
     ``mainline_s`` are those of the vehicles that are or will be in the lane, front first;
     ``ramp_s`` those of ramp vehicles without a merge, the subject first and then who is behind it,
-    in free movement. ``mainline_next_s`` and ``ramp_next_s`` say how much later the next vehicle in
-    the lane may cross than each of them.
+    in free movement, but not before the one ahead. ``mainline_next_s`` and ``ramp_next_s`` say how
+    much later the next vehicle in the lane may cross than each of them.
     """
 
     mainline_s: FloatArray
@@ -67,7 +67,7 @@ def crossings(fleet: Fleet, subject: int, from_s: float, rules: Rules) -> Crossi
     )
     return Crossings(
         -intercepts_m / v0,
-        ramp_s,
+        np.maximum.accumulate(ramp_s),
         (fleet.length_m[order] + clearance_m) / v0,
         (fleet.length_m[rows] + clearance_m) / v0,
     )
@@ -142,7 +142,7 @@ def plan_in_gaps(
         for make_room in (False, True):
             if merge.gap < 0:
                 rung, scenario = RUNG_DELAY, 2 if make_room else 0
-                merge = delay(fleet, proposal, situation, gap, make_room, rules)
+                merge = come_late(fleet, proposal, situation, gap, make_room, rules)
         if merge.gap >= 0:
             plan = plan_of(fleet, proposal, situation, merge, rung, scenario, conflict, rules)
             return plan, proposal, blocked, behind
