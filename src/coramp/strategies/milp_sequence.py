@@ -17,6 +17,9 @@ from coramp.strategies.parameters import parameter
 from coramp.strategies.sequence import Crossings, decide_in_sequence
 
 optimize: Any = untyped_optimize
+UNITS_OF_M = 10.0
+"""The program's unit of time, in longest spans: binaries that are off by the solver's tolerance
+then move constraints by less than that tolerance, which it checks itself."""
 
 
 @dataclass(frozen=True)
@@ -70,30 +73,34 @@ class MilpSequence:
         earliest_s = np.concatenate([seen.mainline_s, seen.ramp_s])
         next_s = np.concatenate([seen.mainline_next_s, seen.ramp_next_s])
         origin_s = float(earliest_s.min())
-        big_m = float(earliest_s.max() - origin_s + np.sum(next_s)) + (lanes + ramps) * max(
+        longest_s = float(earliest_s.max() - origin_s + np.sum(next_s)) + (lanes + ramps) * max(
             self.same_stream_s, self.cross_stream_s
         )
-        rows, bounds = self._constraints(lanes, ramps, next_s, 2.0 * big_m)
-        times = lanes + ramps
-        cost = np.concatenate([np.ones(times), np.zeros(lanes * ramps)])
-        low = np.concatenate([earliest_s - origin_s, np.zeros(lanes * ramps)])
-        high = np.concatenate([np.full(times, big_m), np.ones(lanes * ramps)])
+        unit_s = UNITS_OF_M * longest_s
+        rows, bounds = self._constraints(lanes, ramps, next_s / unit_s, unit_s)
+        times, choices = lanes + ramps, lanes * ramps
         found = optimize.milp(
-            cost,
-            integrality=np.concatenate([np.zeros(times), np.ones(lanes * ramps)]),
-            bounds=optimize.Bounds(low, high),
+            np.concatenate([np.ones(times), np.zeros(choices)]),
+            integrality=np.concatenate([np.zeros(times), np.ones(choices)]),
+            bounds=optimize.Bounds(
+                np.concatenate([(earliest_s - origin_s) / unit_s, np.zeros(choices)]),
+                np.concatenate([np.full(times, 1.0 / UNITS_OF_M), np.ones(choices)]),
+            ),
             constraints=optimize.LinearConstraint(rows, bounds, np.inf),
+            options={"mip_rel_gap": 0.0},
         )
         if found.x is None:
             raise ValueError(f"the order of merging has no solution: {found.message}")
-        crossing_s = found.x[:times] + origin_s
+        crossing_s = found.x[:times] * unit_s + origin_s
         return crossing_s[:lanes], crossing_s[lanes:]
 
     def _constraints(
-        self, lanes: int, ramps: int, next_s: FloatArray, big_m: float
+        self, lanes: int, ramps: int, gaps: FloatArray, unit_s: float
     ) -> tuple[FloatArray, FloatArray]:
-        same = np.maximum(next_s, self.same_stream_s)
-        cross = np.maximum(next_s, self.cross_stream_s)
+        """The rows and lower bounds of the program, in whose unit of time ``gaps`` are."""
+        big_m = 2.0 / UNITS_OF_M
+        same = np.maximum(gaps, self.same_stream_s / unit_s)
+        cross = np.maximum(gaps, self.cross_stream_s / unit_s)
         times = lanes + ramps
         rows, bounds = [], []
 
