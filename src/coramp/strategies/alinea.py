@@ -82,7 +82,8 @@ class Alinea:
             green_again_s = state.next_green_s + cycle_s * passed_veh
             return state._replace(green=False, next_green_s=max(now_s, green_again_s))
         if not state.green and now_s >= state.next_green_s:
-            return state._replace(green=True, next_green_s=now_s)
+            due_s = max(state.next_green_s, now_s - cycle_s)
+            return state._replace(green=True, next_green_s=due_s)
         return state
 
     def _with_sample(self, state: Metering, seen: Detectors) -> Metering:

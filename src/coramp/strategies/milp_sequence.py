@@ -68,7 +68,7 @@ class MilpSequence:
     def crossing_times_s(self, seen: Crossings) -> tuple[FloatArray, FloatArray]:
         """Returns the best crossings (s) of lane and ramp vehicles."""
         lanes, ramps = len(seen.mainline_s), len(seen.ramp_s)
-        if lanes == 0:
+        if lanes + ramps == 1:
             return seen.mainline_s, seen.ramp_s
         earliest_s = np.concatenate([seen.mainline_s, seen.ramp_s])
         next_s = np.concatenate([seen.mainline_next_s, seen.ramp_next_s])
