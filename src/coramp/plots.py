@@ -155,6 +155,24 @@ class StudyPlots:
 
         return capacity_figure(self._drawn("capacity"))
 
+    def plot_field(self) -> "Figure":
+        """Returns every strategy's main figures, with 95 % intervals over seeds.
+
+        Raises CorampError for a study whose layout is not ``field``, and where no run went well.
+        """
+        from coramp.report.field_figure import field_figure
+
+        return field_figure(self._drawn("field"))
+
+    def plot_baseline(self) -> "Figure":
+        """Returns delays (s) of each baseline, and of equal time gaps without and with a plan.
+
+        Raises CorampError for a study whose layout is not ``baseline``, and where no run went well.
+        """
+        from coramp.report.baseline_figure import baseline_figure
+
+        return baseline_figure(self._drawn("baseline"))
+
     def _drawn(self, layout: str) -> pl.DataFrame:
         """The runs that went well, of a study that has this layout."""
         if self.layout != layout:

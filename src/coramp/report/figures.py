@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -9,7 +10,9 @@ from matplotlib.figure import Figure
 from coramp.files import made_folder
 from coramp.loading import load_scenario
 from coramp.planning import plan_snapshot
+from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
+from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.formula_figures import collision_figure, fuel_figure
 from coramp.report.road_figure import road_figure
@@ -22,9 +25,15 @@ from coramp.snapshots import load_snapshot
 
 FORMATS = ("svg", "png")
 SCENARIO, EXAMPLE = "paper", "example"
-CAPACITY_LEFT_OUT = (
-    "capacity is not drawn: its study takes some ten minutes; run coramp study capacity, then add "
-    "--study out/capacity"
+LONG_STUDIES = {
+    "capacity": capacity_figure,
+    "field": field_figure,
+    "baseline": baseline_figure,
+}
+"""Figures of studies that take some ten minutes; they are drawn where the study is given."""
+LEFT_OUT = (
+    "{0} is not drawn: its study takes some ten minutes; run coramp study {0}, then add "
+    "--study out/{0}"
 )
 
 
@@ -42,7 +51,7 @@ def save_figures(
 ) -> FigureSet:
     """Writes every figure into a folder, in each of the formats.
 
-    ``studies`` are by layout: ``paper`` and ``sensitivity`` must be there, ``capacity`` may.
+    ``studies`` are by layout: ``paper`` and ``sensitivity`` must be there, others may.
     Raises CorampError where a file cannot be written.
     """
     made_folder(folder)
@@ -55,8 +64,7 @@ def save_figures(
         for stored in studies.values()
         if stored.failed
     ]
-    if "capacity" not in studies:
-        notes.append(CAPACITY_LEFT_OUT)
+    notes += [LEFT_OUT.format(layout) for layout in LONG_STUDIES if layout not in studies]
     return FigureSet(folder, files, tuple(notes))
 
 
@@ -80,5 +88,6 @@ def _catalogue(
     yield "rungs-by-flow", lambda: rung_figure(by_flow)
     yield "margins", lambda: margin_figure(runs, scenario.safety.execution_allowance_m)
     yield "sensitivity", lambda: sensitivity_figure(studies["sensitivity"].runs)
-    if "capacity" in studies:
-        yield "capacity", lambda: capacity_figure(studies["capacity"].runs)
+    for layout, draw in LONG_STUDIES.items():
+        if layout in studies:
+            yield layout, partial(draw, studies[layout].runs)

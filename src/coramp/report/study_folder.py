@@ -9,7 +9,7 @@ from coramp.errors import CorampError
 from coramp.files import read_json
 from coramp.studies.store import MARK
 
-DRAWN = ("paper", "sensitivity", "capacity")
+DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline")
 """The layouts of studies that there are figures of."""
 
 

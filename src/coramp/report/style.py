@@ -62,12 +62,22 @@ UNCONTROLLED = {
 COOPERATIVE = {
     "mainline-priority": Look("mainline priority", BLUE, "o", "-", 2.8),
     "ramp-priority": Look("ramp priority", PURPLE, "^", ":"),
+    "fifo-optimal-control": Look("FIFO optimal control", GREEN, "v", "--"),
+    "dp-sequence": Look("DP sequence", SKY, "P", "-."),
+    "milp-sequence": Look("MILP sequence", VERMILION, "X", ":"),
+    "game": Look("game", ORANGE, "D", "--"),
+    "virtual-platoon": Look("virtual platoon", BLACK, "s", "-."),
+    "ocbf": Look("OCBF", GREY, "*", "--"),
 }
+METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
 
 
 def look_of(strategy: str, drivers: str | None = None) -> Look:
     """Returns how a strategy is drawn; one that is not known is black, with its own name."""
-    known = UNCONTROLLED.get(drivers) if drivers else COOPERATIVE.get(strategy)
+    if drivers is not None and strategy == "uncontrolled":
+        known = UNCONTROLLED.get(drivers)
+    else:
+        known = COOPERATIVE.get(strategy) or METERED.get(strategy)
     name = f"{strategy} ({drivers})" if drivers else strategy
     return known or Look(name, BLACK, "X", "-")
 

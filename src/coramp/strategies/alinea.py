@@ -33,7 +33,8 @@ class Alinea:
     ``q(k) = q(k-1) + K (o_target - o(k-1))``, q bounded each time, o in % over the last update
     interval. While the detector at the ramp's upstream end is occupied for longer than its
     threshold the ramp is let go (queue override). One vehicle a green: green until one has passed,
-    then red until ``3600 / q`` s after the last green began. At the highest rate it stays green.
+    then red until ``3600 / q`` s after the last green was due, longer for those who pass on yellow.
+    At the highest rate it stays green.
     """
 
     name: ClassVar[str] = "alinea"
@@ -81,6 +82,8 @@ class Alinea:
         if state.green and passed_veh > 0:
             green_again_s = state.next_green_s + cycle_s * passed_veh
             return state._replace(green=False, next_green_s=max(now_s, green_again_s))
+        if passed_veh > 0:  # over yellow
+            return state._replace(next_green_s=state.next_green_s + cycle_s * passed_veh)
         if not state.green and now_s >= state.next_green_s:
             due_s = max(state.next_green_s, now_s - cycle_s)
             return state._replace(green=True, next_green_s=due_s)

@@ -17,9 +17,9 @@ from coramp.strategies.parameters import parameter
 from coramp.strategies.sequence import Crossings, decide_in_sequence
 
 optimize: Any = untyped_optimize
-UNITS_OF_M = 10.0
-"""The program's unit of time, in longest spans: binaries that are off by the solver's tolerance
-then move constraints by less than that tolerance, which it checks itself."""
+SPARE_S = (0.0, 1e-5, 2e-5, 5e-5, 1e-4)
+"""HiGHS now and then refuses its own optimum, which lies just at its tolerance; then all gaps are
+asked to be larger by the next of these."""
 
 
 @dataclass(frozen=True)
@@ -76,31 +76,19 @@ class MilpSequence:
         longest_s = float(earliest_s.max() - origin_s + np.sum(next_s)) + (lanes + ramps) * max(
             self.same_stream_s, self.cross_stream_s
         )
-        unit_s = UNITS_OF_M * longest_s
-        rows, bounds = self._constraints(lanes, ramps, next_s / unit_s, unit_s)
-        times, choices = lanes + ramps, lanes * ramps
-        found = optimize.milp(
-            np.concatenate([np.ones(times), np.zeros(choices)]),
-            integrality=np.concatenate([np.zeros(times), np.ones(choices)]),
-            bounds=optimize.Bounds(
-                np.concatenate([(earliest_s - origin_s) / unit_s, np.zeros(choices)]),
-                np.concatenate([np.full(times, 1.0 / UNITS_OF_M), np.ones(choices)]),
-            ),
-            constraints=optimize.LinearConstraint(rows, bounds, np.inf),
-            options={"mip_rel_gap": 0.0},
-        )
-        if found.x is None:
-            raise ValueError(f"the order of merging has no solution: {found.message}")
-        crossing_s = found.x[:times] * unit_s + origin_s
-        return crossing_s[:lanes], crossing_s[lanes:]
+        for spare_s in SPARE_S:
+            program = self._constraints(lanes, ramps, next_s + spare_s, 2.0 * longest_s)
+            crossing_s = _solution(earliest_s - origin_s, lanes * ramps, longest_s, *program)
+            if crossing_s is not None:
+                return crossing_s[:lanes] + origin_s, crossing_s[lanes:] + origin_s
+        raise ValueError("the program for the order of merging has no solution")
 
     def _constraints(
-        self, lanes: int, ramps: int, gaps: FloatArray, unit_s: float
+        self, lanes: int, ramps: int, next_s: FloatArray, big_m: float
     ) -> tuple[FloatArray, FloatArray]:
-        """The rows and lower bounds of the program, in whose unit of time ``gaps`` are."""
-        big_m = 2.0 / UNITS_OF_M
-        same = np.maximum(gaps, self.same_stream_s / unit_s)
-        cross = np.maximum(gaps, self.cross_stream_s / unit_s)
+        """The rows and lower bounds of the program."""
+        same = np.maximum(next_s, self.same_stream_s)
+        cross = np.maximum(next_s, self.cross_stream_s)
         times = lanes + ramps
         rows, bounds = [], []
 
@@ -121,3 +109,20 @@ class MilpSequence:
                 ask(ramp, i, float(cross[i]) - big_m, binary, -big_m)
                 ask(i, ramp, float(cross[ramp]), binary, big_m)
         return np.array(rows), np.array(bounds)
+
+
+def _solution(
+    earliest_s: FloatArray, choices: int, longest_s: float, rows: FloatArray, least: FloatArray
+) -> FloatArray | None:
+    times = len(earliest_s)
+    found = optimize.milp(
+        np.concatenate([np.ones(times), np.zeros(choices)]),
+        integrality=np.concatenate([np.zeros(times), np.ones(choices)]),
+        bounds=optimize.Bounds(
+            np.concatenate([earliest_s, np.zeros(choices)]),
+            np.concatenate([np.full(times, longest_s), np.ones(choices)]),
+        ),
+        constraints=optimize.LinearConstraint(rows, least, np.inf),
+        options={"mip_rel_gap": 0.0},
+    )
+    return None if found.x is None else np.asarray(found.x[:times])

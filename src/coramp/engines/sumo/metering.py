@@ -1,10 +1,12 @@
 """A signal at the ramp and loops on the road, for strategies that meter ordinary drivers."""
 
+import math
+
 import numpy as np
 
 from coramp.coordination.ledger import Ledger
 from coramp.core.rules import packed
-from coramp.engines.sumo.session import Session
+from coramp.engines.sumo.session import GREEN, RED, YELLOW, Session
 from coramp.scenario import Scenario
 from coramp.strategies.base import Decider, Detectors, Memory, Reports, SetRampSignal, View
 
@@ -12,14 +14,16 @@ MAINLINE_LOOP, QUEUE_LOOP, PASSAGE_LOOP = "mainline", "queue", "passage"
 QUEUE_LOOP_M = 20.0
 """How far behind its start the ramp has the loop that sees a queue too long for it."""
 PASSAGE_LOOP_M = 1.0
-SIGNAL = "nose"
+SIGNAL, RAMP_LANE = "nose", "ramp_0"
+YELLOW_S = 2.0
+"""Between green and red; who cannot stop in comfort by then goes on."""
 
 
 def loops(scenario: Scenario, period_s: float) -> str:
     """Returns SUMO's file of loops: beside the acceleration lane, at the ramp's start and end."""
     places = (
         (MAINLINE_LOOP, "merge_1", scenario.detector_station_m),
-        (QUEUE_LOOP, "ramp_0", min(QUEUE_LOOP_M, -0.25 * scenario.ramp.start_m)),
+        (QUEUE_LOOP, RAMP_LANE, min(QUEUE_LOOP_M, -0.25 * scenario.ramp.start_m)),
         (PASSAGE_LOOP, "merge_0", PASSAGE_LOOP_M),
     )
     lines = [
@@ -41,7 +45,8 @@ class Meter:
         self._rules, self._packed = rules, packed(rules)
         self._fastest_mps = scenario.fastest_mainline_entry_mps
         self._nobody = Ledger(rules.road.mainline_speed_mps, rules.road.mainline_end_m).fleet
-        session.set_ramp_signal(SIGNAL, "ramp_0", True)
+        self._red_s = math.inf
+        session.set_signal(SIGNAL, RAMP_LANE, GREEN)
 
     def decide(self, time_s: float) -> None:
         """Asks the strategy and does what it says."""
@@ -49,7 +54,11 @@ class Meter:
         self._memory = decision.memory
         for command in decision.commands:
             if isinstance(command, SetRampSignal):
-                self._session.set_ramp_signal(SIGNAL, "ramp_0", command.green)
+                self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if command.green else YELLOW)
+                self._red_s = math.inf if command.green else time_s + YELLOW_S
+        if time_s >= self._red_s:
+            self._session.set_signal(SIGNAL, RAMP_LANE, RED)
+            self._red_s = math.inf
 
     def _view(self, time_s: float) -> View:
         session = self._session

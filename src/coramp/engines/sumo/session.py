@@ -22,6 +22,7 @@ OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
+GREEN, YELLOW, RED = "G", "y", "r"
 FASTEST_COMMAND_MPS = 100.0
 ACTION_S = 1.0
 """How often SUMO lets a vehicle that was taken over look around.
@@ -115,10 +116,10 @@ class Session:
         libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
         self._act_now(vehicle_id)
 
-    def set_ramp_signal(self, signal: str, lane: str, green: bool) -> None:
+    def set_signal(self, signal: str, lane: str, colour: str) -> None:
         """Sets the links of a signal that come from ``lane``; all others stay green."""
         links = libsumo.trafficlight.getControlledLinks(signal)
-        state = "".join("r" if not green and link[0][0] == lane else "G" for link in links)
+        state = "".join(colour if link[0][0] == lane else GREEN for link in links)
         libsumo.trafficlight.setRedYellowGreenState(signal, state)
 
     def loop_occupancy(self, loop: str) -> float:

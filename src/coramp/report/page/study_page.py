@@ -9,7 +9,9 @@ from coramp.errors import CorampError
 from coramp.files import read_json
 from coramp.metrics.schemas import RESULT_VERSION
 from coramp.metrics.tables import Row
+from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
+from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.pages import check_same_arrivals
@@ -34,6 +36,8 @@ DRAWN = {
     ),
     "sensitivity": (("Delay by setting", sensitivity_figure),),
     "capacity": (("Where each strategy breaks down", capacity_figure),),
+    "field": (("Every strategy on the same arrivals", field_figure),),
+    "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
 }
 
 

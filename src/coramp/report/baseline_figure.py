@@ -1,0 +1,112 @@
+"""What a gain owes to its baseline, and what to short gaps without any plan."""
+
+from typing import Any
+
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from coramp.report.style import (
+    BLUE,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    grid,
+    legend_below,
+    new_figure,
+)
+from coramp.studies.baseline_layout import CONTROLLED, GAP, settings_of
+from coramp.studies.statistics import estimate
+
+FLOW = ["mainline_veh_h", "ramp_veh_h"]
+POPULATIONS = {"paper": (VERMILION, "s", -0.2), "fair": (ORANGE, "D", 0.2)}
+KINDS = {
+    "ACC": ("uncoordinated, ACC", VERMILION, "s", "--"),
+    "CACC": ("uncoordinated, CACC", ORANGE, "D", "-."),
+    CONTROLLED: ("mainline priority", BLUE, "o", "-"),
+    "ramp-priority": ("ramp priority", PURPLE, "^", ":"),
+}
+
+
+def baseline_figure(runs: pl.DataFrame) -> Figure:
+    """Returns the mainline delay of each baseline by flow, and delay over the time gap by flow."""
+    rows = [
+        {**run, "said": settings_of(run), "delay_s": _delay_s(run)}
+        for run in runs.filter(status="ok").iter_rows(named=True)
+    ]
+    flows = sorted({(row[FLOW[0]], row[FLOW[1]]) for row in rows})
+    figure = new_figure(11.0, 4.6)
+    diagrams = figure.subplots(1, 1 + len(flows), sharey=True)
+    _draw_baselines(diagrams[0], rows, flows)
+    for axes, flow in zip(diagrams[1:], flows, strict=True):
+        _draw_gaps(axes, [row for row in rows if (row[FLOW[0]], row[FLOW[1]]) == flow])
+        axes.set(xlabel="time gap (s)", title=f"{flow[0]:g} + {flow[1]:g} veh/h")
+    for axes in diagrams:
+        axes.set_yscale("symlog", linthresh=0.1, linscale=0.5)
+        axes.set_ylim(bottom=0.0)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        grid(axes)
+    diagrams[0].set_ylabel("mean delay of all (s)")
+    legend_below(figure, diagrams, 3)
+    return figure
+
+
+def _delay_s(run: dict[str, Any]) -> float:
+    mainline, ramp = run["vehicles_mainline"], run["vehicles_ramp"]
+    lost_s = (run["mainline_delay_s"] or 0.0) * mainline + (run["ramp_delay_s"] or 0.0) * ramp
+    return float(lost_s / max(1, mainline + ramp))
+
+
+def _draw_baselines(
+    axes: Axes, rows: list[dict[str, Any]], flows: list[tuple[float, float]]
+) -> None:
+    own = [row for row in rows if row["drivers"] and row["said"]["car_following"] == "Krauss"]
+    places = {flow: k for k, flow in enumerate(f for f in flows if _at(own, f))}
+    for population, (colour, marker, aside) in POPULATIONS.items():
+        for flow, place in places.items():
+            groups: dict[str, list[float]] = {}
+            for row in _at(own, flow):
+                if row["drivers"] == population:
+                    groups.setdefault(row["overrides"] or "", []).append(row["delay_s"])
+            means = [estimate(delays_s).mean for delays_s in groups.values()]
+            spread = [aside * (0.4 + k / max(1, len(means))) for k in range(len(means))]
+            axes.plot(
+                [place + at for at in spread],
+                means,
+                color=colour,
+                marker=marker,
+                markerfacecolor="none",
+                markersize=4.0,
+                linestyle="",
+                label=f"no control, {population} drivers, one a baseline",
+            )
+    ours = [row for row in rows if row["strategy"] == CONTROLLED and row["said"][GAP] == 0.0]
+    means = [estimate([row["delay_s"] for row in _at(ours, flow)]).mean for flow in places]
+    axes.plot(list(places.values()), means, color=BLUE, marker="o", label="mainline priority")
+    axes.set_xticks(list(places.values()), [f"{m:g}\n+ {r:g}" for m, r in places])
+    axes.set(xlabel="flow (veh/h)", title="every baseline")
+
+
+def _at(rows: list[dict[str, Any]], flow: tuple[float, float]) -> list[dict[str, Any]]:
+    return [row for row in rows if (row[FLOW[0]], row[FLOW[1]]) == flow]
+
+
+def _draw_gaps(axes: Axes, rows: list[dict[str, Any]]) -> None:
+    for kind, (label, colour, marker, line) in KINDS.items():
+        found: dict[float, list[float]] = {}
+        for row in rows:
+            if row["drivers"] and row["said"]["car_following"] == kind:
+                found.setdefault(row["said"]["tau_s"], []).append(row["delay_s"])
+            elif row["strategy"] == kind and "acceleration_lane" not in (row["overrides"] or ""):
+                found.setdefault(row["said"][GAP], []).append(row["delay_s"])
+        gaps = sorted(found)
+        estimates = [estimate(found[gap]) for gap in gaps]
+        axes.errorbar(
+            gaps,
+            [e.mean for e in estimates],
+            yerr=[e.half_width if e.values > 1 else 0.0 for e in estimates],
+            color=colour,
+            marker=marker,
+            linestyle=line,
+            label=label,
+        )
