@@ -8,6 +8,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from coramp import _registration
 from coramp.errors import CorampError
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ __all__ = [
     "run",
     "study",
 ]
+
+_registration.register()
 
 
 def __getattr__(name: str) -> Any:

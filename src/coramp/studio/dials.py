@@ -88,10 +88,16 @@ class Studio:
 
     @property
     def choices(self) -> list[str]:
-        """What may be chosen: cooperative strategies, and each population of drivers."""
+        """What may be chosen: cooperative strategies, then others with each kind of drivers."""
+        every = strategies().items()
         return [
-            *(name for name, found in strategies().items() if found.cooperative),
-            *(f"uncontrolled:{drivers}" for drivers in self.scenario.drivers),
+            *(name for name, found in every if found.cooperative),
+            *(
+                f"{name}:{drivers}"
+                for name, found in every
+                if not found.cooperative
+                for drivers in self.scenario.drivers
+            ),
         ]
 
     def specs(self, asked: Mapping[str, str]) -> list[RunSpec]:

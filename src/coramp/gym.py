@@ -1,0 +1,283 @@
+"""A Gymnasium environment: ramp vehicles as agents, everyone else cooperative, no simulator.
+
+Once this module is imported, ``gymnasium.make("coramp/Merge-v0")`` makes one.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from coramp._kernel import FloatArray, IntArray, kernel
+from coramp._registration import register
+from coramp.arrivals import arrivals_of
+from coramp.coordination.coordinator import Coordinator
+from coramp.core.fleet import Fleet
+from coramp.core.rules import Rules, packed, unpacked
+from coramp.core.trajectory import station_and_speed
+from coramp.errors import CorampError
+from coramp.loading import load_scenario
+from coramp.strategies.base import Decider, Decision, DriveWithAcceleration, Memory, View
+from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
+from coramp.strategies.registry import strategy_named
+
+NEIGHBOURS = 2
+"""So many vehicles before the agent in the order of merging are seen, and so many behind it."""
+FEATURES = 5 + 4 * NEIGHBOURS
+STATION_FEATURE = 1
+FARTHEST_M = 400.0
+"""Who is further away, or not there at all, counts as this far away, at the lane's speed."""
+WARM_UP_S = 30.0
+ACTION_WEIGHT = 0.02
+INTERVENTION_COST = 1.0
+
+
+register()
+
+
+class Seen(NamedTuple):
+    """What agents see: a row of features a slot, 0 for slots without an agent, and their rows."""
+
+    features: FloatArray
+    rows: IntArray
+
+
+class _Others:
+    """The strategy of ramp vehicles that are no agents.
+
+    Agents are never planned, and who waits behind one tries again after a while.
+    """
+
+    def __init__(self, strategy: Decider, everyone: bool) -> None:
+        self.agent = -1
+        self._everyone = everyone
+        self._strategy = strategy
+
+    def decide(self, view: View, memory: Memory) -> Decision:
+        """Returns the decision for the first subject, nothing for an agent."""
+        row, *rest = view.subjects
+        if self._everyone or row == self.agent:
+            return Decision((), tuple((view.time_s, other) for other in rest), memory)
+        decision = self._strategy.decide(view, memory)
+        if decision.commands or any(other == row for _, other in decision.wakes_s):
+            return decision
+        again = (view.time_s + view.rules.control.retry_s, row)
+        return replace(decision, wakes_s=(*decision.wakes_s, again))
+
+
+class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
+    """Merging onto an expressway in the exact engine; a step is ``period_s``.
+
+    **Agents.** ``agents="one"``: the first ramp vehicle that enters after 30 s; the others follow
+    the strategy ``others``. ``agents="all"``: every ramp vehicle, the foremost ``slots`` of those
+    before their merge at a time, front first.
+
+    **Action**, shape (1,) or (slots,), from -1 to 1: the acceleration for a step as a share of the
+    hardest, of ``comfort_mps2`` (2.94) below 0 and of ``speed_up_mps2`` (1.5) above. The supervisor
+    carries out what is safe and lets the vehicle merge as soon as that is safe; otherwise it keeps
+    its last safe commitment.
+
+    **Observation**, shape (13,) or (slots, 13), SI units: 1 if there is an agent; its station and
+    speed; bumper distance to and speed of the vehicle ahead on the ramp; then for the two before
+    it, the further one first, and the two behind it in the order of merging how far ahead its place
+    on the mainline is (``strategies.feedback.Platoon``; negative behind), and that place's speed.
+    Who is not there counts as 400 m away at the speed of the lane. Rows without an agent are 0.
+
+    **Reward** of a step, summed over agents: ``-(1 - v / v_d) period_s``, the time lost in s, less
+    ``0.02 u^2 period_s``, less 1 for each command that the supervisor refused. v_d is v_R0 before
+    the nose, v0 behind it.
+
+    **End.** Terminated once the agent (all ramp vehicles) has merged; truncated after
+    ``longest_s`` (600). ``info`` has ``time_s``, ``interventions`` and ``rows``, the agents' rows
+    in the ledger. The same seed gives the same traffic.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
+
+    def __init__(
+        self,
+        scenario: str = "paper",
+        agents: str = "one",
+        *,
+        mainline_veh_h: float = 1800.0,
+        ramp_veh_h: float = 500.0,
+        horizon_s: float = 90.0,
+        period_s: float = 0.5,
+        slots: int = 8,
+        others: str = "mainline-priority",
+        longest_s: float = 600.0,
+    ) -> None:
+        """Raises CorampError for a scenario, strategy or number that cannot be."""
+        if agents not in ("one", "all"):
+            raise CorampError(f"agents: {agents!r} cannot be; allowed are one, all")
+        if horizon_s <= WARM_UP_S or not slots >= 1:
+            raise CorampError(f"horizon_s: must be above {WARM_UP_S:g} s, and slots at least 1")
+        flows = {"mainline.flow_veh_h": mainline_veh_h, "ramp.flow_veh_h": ramp_veh_h}
+        self._scenario = load_scenario(
+            scenario, {**{k: float(v) for k, v in flows.items()}, "simulation.horizon_s": horizon_s}
+        )
+        self._rules = self._scenario.rules()
+        self._step_s = self._rules.control.step_s
+        self._period = max(1, round(period_s / self._step_s))
+        self._hold_s = self._period * self._step_s
+        self._longest = round(longest_s / self._step_s)
+        self._packed = packed(self._rules)
+        self._everyone = agents == "all"
+        self._slots = slots if self._everyone else 1
+        self._others = strategy_named(others)
+        if not self._others.cooperative or hasattr(self._others, "period_s"):
+            raise CorampError(f"others: {others} does not plan; choose a planning strategy")
+        self._actions = spaces.Box(-1.0, 1.0, (self._slots,), np.float64)
+        shape = (self._slots, FEATURES) if self._everyone else (FEATURES,)
+        self._observations = spaces.Box(*_bounds(self._rules, shape), dtype=np.float64)
+        self.action_space, self.observation_space = self._actions, self._observations
+        self._seen = Seen(np.zeros((self._slots, FEATURES)), np.empty(0, np.int64))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Returns the first observation: an agent has just entered the ramp."""
+        super().reset(seed=seed, options=options)
+        while True:
+            traffic = int(self.np_random.integers(2**31 - 1))
+            if self._begin(traffic):
+                return self._observation(), self._info()
+
+    def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Drives for a period; see the class for what it returns."""
+        loop, rows = self._loop, self._seen.rows.tolist()
+        share = np.clip(np.asarray(action, np.float64).reshape(-1), -1.0, 1.0)
+        if not np.isfinite(share).all():
+            raise CorampError("action: holds a number that is not finite")
+        motion = self._rules.motion
+        accel_mps2 = share * np.where(share < 0.0, motion.comfort_mps2, motion.speed_up_mps2)
+        refused = loop.interventions
+        if rows:
+            pairs = zip(rows, accel_mps2.tolist(), strict=False)
+            commands = tuple(DriveWithAcceleration(row, u, self._hold_s) for row, u in pairs)
+            loop.carry_out(Decision(commands), (), self._now)
+        before_m = self._seen.features[: len(rows), STATION_FEATURE]
+        self._now += self._period
+        loop.run(self._now)
+        reward = self._reward(rows, before_m, accel_mps2)
+        reward -= INTERVENTION_COST * (loop.interventions - refused)
+        self._seen = self._look()
+        over = self._now - self._started >= self._longest
+        return self._observation(), reward, self._ended(), over, self._info()
+
+    def _begin(self, traffic: int) -> bool:
+        """Draws new traffic and lets it run until there is an agent; False where none comes."""
+        self._arrivals = arrivals_of(self._scenario, traffic)
+        self._strategy = _Others(self._others(), self._everyone)
+        self._loop = Coordinator(
+            self._strategy, self._rules, self._arrivals, self._scenario.fastest_mainline_entry_mps
+        )
+        self._loop.expect_arrivals()
+        first = 0 if self._everyone else round(WARM_UP_S / self._step_s)
+        steps = [a.step for a in self._arrivals if a.on_ramp and a.step >= first]
+        if not steps:
+            return False
+        self._now = steps[0] - 1
+        self._loop.run(self._now)
+        entered = len(self._loop.ledger)
+        self._strategy.agent = -1
+        while self._strategy.agent < 0:
+            self._now += 1
+            self._loop.run(self._now)
+            self._strategy.agent = self._first_on_ramp(entered)
+        self._started, self._seen = self._now, self._look()
+        return True
+
+    def _first_on_ramp(self, first: int) -> int:
+        """Returns the first row from that one on without a committed merge, -1 for none."""
+        ledger = self._loop.ledger
+        waiting = (r for r in range(first, len(ledger)) if ledger.merge_time_s(r) == math.inf)
+        return next(waiting, -1)
+
+    def _look(self) -> Seen:
+        wanted = -1 if self._everyone else self._strategy.agent
+        fleet = self._loop.ledger.fleet
+        at_s = self._now * self._step_s
+        return Seen(*seen_by_agents(fleet, at_s, wanted, self._slots, self._packed))
+
+    def _observation(self) -> FloatArray:
+        features = self._seen.features if self._everyone else self._seen.features[0]
+        return np.clip(features, self._observations.low, self._observations.high)
+
+    def _reward(self, rows: list[int], before_m: FloatArray, accel_mps2: FloatArray) -> float:
+        road, ledger, reward = self._rules.road, self._loop.ledger, 0.0
+        now_s = self._now * self._step_s
+        for row, was_m, accel in zip(rows, before_m.tolist(), accel_mps2.tolist(), strict=False):
+            is_m, _ = station_and_speed(ledger.trajectory(row), now_s)
+            on_ramp_m = min(0.0, is_m) - min(0.0, was_m)
+            wished_s = on_ramp_m / road.ramp_speed_mps
+            wished_s += (is_m - was_m - on_ramp_m) / road.mainline_speed_mps
+            reward += wished_s - self._hold_s - ACTION_WEIGHT * accel * accel * self._hold_s
+        return reward
+
+    def _ended(self) -> bool:
+        if len(self._seen.rows):
+            return False
+        left = self._loop.waiting() if self._everyone else []
+        return not any(self._arrivals[number].on_ramp for number in left)
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "time_s": self._now * self._step_s,
+            "interventions": self._loop.interventions,
+            "rows": self._seen.rows.tolist(),
+        }
+
+
+def _bounds(rules: Rules, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    fastest_mps = rules.road.mainline_speed_mps * (1.0 + rules.motion.speed_deviation)
+    lane_m = rules.road.acceleration_lane_m
+    low = [0.0, rules.road.ramp_start_m, 0.0, 0.0, 0.0] + [-FARTHEST_M, 0.0] * (2 * NEIGHBOURS)
+    high = [1.0, lane_m, fastest_mps, FARTHEST_M, fastest_mps]
+    high += [FARTHEST_M, 2.0 * fastest_mps] * (2 * NEIGHBOURS)
+    return (
+        np.broadcast_to(np.array(low), shape).copy(),
+        np.broadcast_to(np.array(high), shape).copy(),
+    )
+
+
+@kernel
+def seen_by_agents(
+    fleet: Fleet, at_s: float, wanted: int, slots: int, packed_rules: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Returns the features of ramp vehicles before their merge, front first, and their rows.
+
+    ``wanted`` is the only row that is an agent, -1 makes all of them agents.
+    """
+    rules = unpacked(packed_rules)
+    road = rules.road
+    platoon = virtual_platoon(fleet, at_s, packed_rules)
+    features = np.zeros((slots, FEATURES))
+    rows = np.empty(slots, np.int64)
+    n, last_on_ramp = 0, -1
+    for k in range(len(platoon.rows)):
+        if platoon.stage[k] == MAINLINE:
+            continue
+        if n < slots and wanted in (-1, platoon.rows[k]):
+            rows[n] = platoon.rows[k]
+            wish_mps = road.ramp_speed_mps if platoon.stage[k] == RAMP else road.mainline_speed_mps
+            own = features[n]
+            own[0], own[1], own[2] = 1.0, platoon.station_m[k], platoon.speed_mps[k]
+            own[3], own[4] = FARTHEST_M, wish_mps
+            if last_on_ramp >= 0:
+                ahead_m = platoon.station_m[last_on_ramp] - platoon.length_m[last_on_ramp]
+                own[3] = ahead_m - platoon.station_m[k]
+                own[4] = platoon.speed_mps[last_on_ramp]
+            for j in range(2 * NEIGHBOURS):
+                other = k - NEIGHBOURS + j + (j >= NEIGHBOURS)
+                own[5 + 2 * j] = FARTHEST_M if j < NEIGHBOURS else -FARTHEST_M
+                own[6 + 2 * j] = road.mainline_speed_mps
+                if 0 <= other < len(platoon.rows):
+                    own[5 + 2 * j] = platoon.virtual_m[other] - platoon.virtual_m[k]
+                    own[6 + 2 * j] = platoon.virtual_mps[other]
+            n += 1
+        last_on_ramp = k
+    return features, rows[:n]
