@@ -20,7 +20,14 @@ from coramp.core.rules import Rules, packed, unpacked
 from coramp.core.trajectory import station_and_speed
 from coramp.errors import CorampError
 from coramp.loading import load_scenario
-from coramp.strategies.base import Decider, Decision, DriveWithAcceleration, Memory, View
+from coramp.strategies.base import (
+    Decider,
+    Decision,
+    DriveWithAcceleration,
+    Memory,
+    View,
+    period_of,
+)
 from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
 from coramp.strategies.registry import strategy_named
 
@@ -91,8 +98,9 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     the nose, v0 behind it.
 
     **End.** Terminated once the agent (all ramp vehicles) has merged; truncated after
-    ``longest_s`` (600). ``info`` has ``time_s``, ``interventions`` and ``rows``, the agents' rows
-    in the ledger. The same seed gives the same traffic.
+    ``longest_s`` (600). A merge once committed is only replaced by another that is safe. ``loop``
+    is the coordinator underneath; ``info`` has ``time_s``, ``interventions`` and ``rows``, the
+    agents' rows in the ledger. The same seed gives the same traffic.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
@@ -113,8 +121,12 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Raises CorampError for a scenario, strategy or number that cannot be."""
         if agents not in ("one", "all"):
             raise CorampError(f"agents: {agents!r} cannot be; allowed are one, all")
-        if horizon_s <= WARM_UP_S or not slots >= 1:
-            raise CorampError(f"horizon_s: must be above {WARM_UP_S:g} s, and slots at least 1")
+        if horizon_s <= WARM_UP_S:
+            raise CorampError(
+                f"horizon_s: {horizon_s:g} cannot be; allowed is above {WARM_UP_S:g} s"
+            )
+        if slots < 1:
+            raise CorampError(f"slots: {slots} cannot be; allowed is at least 1")
         flows = {"mainline.flow_veh_h": mainline_veh_h, "ramp.flow_veh_h": ramp_veh_h}
         self._scenario = load_scenario(
             scenario, {**{k: float(v) for k, v in flows.items()}, "simulation.horizon_s": horizon_s}
@@ -128,7 +140,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._everyone = agents == "all"
         self._slots = slots if self._everyone else 1
         self._others = strategy_named(others)
-        if not self._others.cooperative or hasattr(self._others, "period_s"):
+        if not self._others.cooperative or period_of(self._others()) is not None:
             raise CorampError(f"others: {others} does not plan; choose a planning strategy")
         self._actions = spaces.Box(-1.0, 1.0, (self._slots,), np.float64)
         shape = (self._slots, FEATURES) if self._everyone else (FEATURES,)
@@ -148,7 +160,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Drives for a period; see the class for what it returns."""
-        loop, rows = self._loop, self._seen.rows.tolist()
+        loop, rows = self.loop, self._seen.rows.tolist()
         share = np.clip(np.asarray(action, np.float64).reshape(-1), -1.0, 1.0)
         if not np.isfinite(share).all():
             raise CorampError("action: holds a number that is not finite")
@@ -172,34 +184,34 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Draws new traffic and lets it run until there is an agent; False where none comes."""
         self._arrivals = arrivals_of(self._scenario, traffic)
         self._strategy = _Others(self._others(), self._everyone)
-        self._loop = Coordinator(
+        self.loop = Coordinator(
             self._strategy, self._rules, self._arrivals, self._scenario.fastest_mainline_entry_mps
         )
-        self._loop.expect_arrivals()
+        self.loop.expect_arrivals()
         first = 0 if self._everyone else round(WARM_UP_S / self._step_s)
         steps = [a.step for a in self._arrivals if a.on_ramp and a.step >= first]
         if not steps:
             return False
         self._now = steps[0] - 1
-        self._loop.run(self._now)
-        entered = len(self._loop.ledger)
+        self.loop.run(self._now)
+        entered = len(self.loop.ledger)
         self._strategy.agent = -1
         while self._strategy.agent < 0:
             self._now += 1
-            self._loop.run(self._now)
+            self.loop.run(self._now)
             self._strategy.agent = self._first_on_ramp(entered)
         self._started, self._seen = self._now, self._look()
         return True
 
     def _first_on_ramp(self, first: int) -> int:
         """Returns the first row from that one on without a committed merge, -1 for none."""
-        ledger = self._loop.ledger
+        ledger = self.loop.ledger
         waiting = (r for r in range(first, len(ledger)) if ledger.merge_time_s(r) == math.inf)
         return next(waiting, -1)
 
     def _look(self) -> Seen:
         wanted = -1 if self._everyone else self._strategy.agent
-        fleet = self._loop.ledger.fleet
+        fleet = self.loop.ledger.fleet
         at_s = self._now * self._step_s
         return Seen(*seen_by_agents(fleet, at_s, wanted, self._slots, self._packed))
 
@@ -208,7 +220,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         return np.clip(features, self._observations.low, self._observations.high)
 
     def _reward(self, rows: list[int], before_m: FloatArray, accel_mps2: FloatArray) -> float:
-        road, ledger, reward = self._rules.road, self._loop.ledger, 0.0
+        road, ledger, reward = self._rules.road, self.loop.ledger, 0.0
         now_s = self._now * self._step_s
         for row, was_m, accel in zip(rows, before_m.tolist(), accel_mps2.tolist(), strict=False):
             is_m, _ = station_and_speed(ledger.trajectory(row), now_s)
@@ -221,13 +233,13 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     def _ended(self) -> bool:
         if len(self._seen.rows):
             return False
-        left = self._loop.waiting() if self._everyone else []
+        left = self.loop.waiting() if self._everyone else []
         return not any(self._arrivals[number].on_ramp for number in left)
 
     def _info(self) -> dict[str, Any]:
         return {
             "time_s": self._now * self._step_s,
-            "interventions": self._loop.interventions,
+            "interventions": self.loop.interventions,
             "rows": self._seen.rows.tolist(),
         }
 

@@ -1,7 +1,7 @@
 """The contract that every strategy keeps, to be checked on one of your own."""
 
 from collections.abc import Iterable
-from typing import cast
+from typing import Any
 
 import numpy as np
 
@@ -10,25 +10,38 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.guard import Guarded
 from coramp.loading import load_scenario
 from coramp.scenario import Scenario
-from coramp.strategies.base import Decision, Memory, Strategy, View
+from coramp.strategies.base import (
+    Decision,
+    FollowTrajectory,
+    Memory,
+    Strategy,
+    View,
+    is_metered,
+    period_of,
+)
 
 FLOWS_VEH_H = ((800.0, 200.0), (1800.0, 500.0), (2600.0, 900.0))
 
 
 class Twice:
-    """Asks a strategy twice; it must answer the same, and leave what it is shown alone."""
+    """Asks a strategy twice; it must answer the same, and leave what it is shown alone.
 
-    summary = ""
+    ``asked`` counts its decisions. Trajectories must start in time and be the strategy's own.
+    """
 
     def __init__(self, strategy: type[Strategy]) -> None:
         self.name, self.cooperative = strategy.name, strategy.cooperative
+        self.period_s = period_of(strategy())
+        self.metered = is_metered(strategy())
         self.asked = 0
         self._strategy = strategy
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision; raises AssertionError where the contract is broken."""
         self.asked += 1
-        shown = [*view.fleet, *view.acknowledged]
+        reports = view.reports
+        stated = (reports.time_s, reports.station_m, reports.speed_mps, reports.std_m)
+        shown: list[Any] = [*stated, *view.fleet, *view.acknowledged]
         copies = [array.copy() for array in shown]
         decision = self._strategy().decide(view, memory)
         again = self._strategy().decide(view, memory)
@@ -36,7 +49,17 @@ class Twice:
             np.testing.assert_array_equal(array, copy, f"{self.name} writes into its view")
         if repr(decision) != repr(again):
             raise AssertionError(f"{self.name} answers the same question differently")
+        for command in decision.commands:
+            if isinstance(command, FollowTrajectory):
+                self._check(command, view)
         return decision
+
+    def _check(self, command: FollowTrajectory, view: View) -> None:
+        earliest_s = view.time_s + view.rules.control.actuation_delay_s
+        if command.pieces[0, 0] < earliest_s - 1e-9:
+            raise AssertionError(f"{self.name} commands what should have begun already")
+        if np.shares_memory(command.pieces, view.fleet.pieces):
+            raise AssertionError(f"{self.name} commands with the view's own arrays")
 
 
 def check_strategy(strategy: type[Strategy], seeds: Iterable[int] = (1, 2, 3)) -> None:
@@ -55,7 +78,7 @@ def check_strategy(strategy: type[Strategy], seeds: Iterable[int] = (1, 2, 3)) -
 
 def _check(watched: Twice, scenario: Scenario, seed: int) -> None:
     coordinator = Coordinator(
-        cast("Strategy", Guarded(cast("Strategy", watched))),
+        Guarded(watched),
         scenario.rules(),
         arrivals_of(scenario, seed),
         scenario.fastest_mainline_entry_mps,

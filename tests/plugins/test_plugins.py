@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ import coramp
 from coramp.coordination.guard import Guarded, time_limit
 from coramp.errors import CorampError
 from coramp.skeleton import write_skeleton
-from coramp.strategies.base import Decision, FollowTrajectory
+from coramp.strategies.base import Decision, DriveWithAcceleration, FollowTrajectory
 from coramp.strategies.mainline_priority import MainlinePriority
+from coramp.strategies.parameters import parameter
 from coramp.testing import check_strategy
 
 STUDY = """
@@ -63,7 +66,17 @@ def waking_in_the_past(_):
     return Decision(wakes_s=((-1.0, 0),))
 
 
+def steering_without_a_number(decide):
+    return Decision((DriveWithAcceleration(decide.commands[0].row, np.nan, 0.5),))
+
+
+def steering_nobody(_):
+    return Decision((DriveWithAcceleration(9999, 1.0, 0.5),))
+
+
 MISTAKES = [
+    (steering_without_a_number, "commands numbers that are not finite"),
+    (steering_nobody, "commands an unknown vehicle, row 9999"),
     (raising, "raises ZeroDivisionError: no gap to divide by"),
     (not_finite, "commands numbers that are not finite"),
     (commanding_nobody, "commands an unknown vehicle, row 9999"),
@@ -116,6 +129,46 @@ def test_a_strategy_that_wakes_itself_without_end_is_stopped():
     coramp.register(Restless)
     with pytest.raises(CorampError, match=r"restless: at .* it wakes itself without end"):
         coramp.run("paper", "restless", engine="exact", horizon_s=60)
+
+
+@pytest.mark.parametrize("period", [0.0, -1.0, np.nan, "often"])
+def test_a_period_that_cannot_be_is_refused(period):
+    class Pacing:
+        name, summary, cooperative, period_s = "pacing", "keeps asking", True, period
+
+        def decide(self, view, memory):
+            return Decision()
+
+    coramp.register(Pacing, replace=True)
+    with pytest.raises(CorampError, match=r"strategy pacing: period_s: .* cannot be; allowed is"):
+        coramp.run("paper", "pacing", engine="exact", horizon_s=60)
+
+
+def test_one_of_ones_own_may_steer_and_have_parameters():
+    @dataclass(frozen=True)
+    class Steady:
+        """Everyone keeps its speed; the supervisor lets ramp vehicles merge where that is safe."""
+
+        name: ClassVar[str] = "steady"
+        summary: ClassVar[str] = "no acceleration but the supervisor's"
+        cooperative: ClassVar[bool] = True
+        period_s: float = parameter(0.5, 0.1, 2.0, meaning="control period")
+
+        def decide(self, view, memory):
+            if view.subjects:
+                return Decision()
+            rows = view.fleet.live.tolist()
+            return Decision(tuple(DriveWithAcceleration(r, 0.0, self.period_s) for r in rows))
+
+    coramp.register(Steady, replace=True)
+    run = coramp.run(
+        "paper", "steady", horizon_s=60, seed=2, overrides={"strategy.steady.period_s": 1}
+    )
+    assert run.broken_promises == []
+    assert run.summary["unserved"] == 0
+    with pytest.raises(CorampError, match=r"strategy.steady.period_s: 9.* a number from 0.1 to 2"):
+        coramp.run("paper", "steady", overrides={"strategy.steady.period_s": 9.0})
+    check_strategy(Steady, seeds=(1,))
 
 
 def test_one_that_cannot_be_made_is_named():

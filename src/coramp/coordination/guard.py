@@ -4,7 +4,7 @@ import signal
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from coramp.strategies.base import (
     Memory,
     ReleaseToDriver,
     SetRampSignal,
-    Strategy,
     View,
     is_metered,
     period_of,
@@ -29,6 +28,7 @@ from coramp.strategies.registry import OURS, origin_of, strategy_named
 
 LONGEST_DECISION_S = 10.0
 """Wall time after which a decision counts as one that never comes; compiling does not count."""
+SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.01, 3600.0
 MOST_AT_ONCE = 10_000
 """So many decisions at one time are a strategy that wakes itself without end."""
 
@@ -37,12 +37,21 @@ class TooLong(BaseException):
     """A decision takes too long; no ``except Exception`` of a strategy catches it."""
 
 
+class Guardable(Decider, Protocol):
+    """Whatever answers like a strategy and has a name."""
+
+    @property
+    def name(self) -> str:
+        """What to call it in errors."""
+        ...
+
+
 class Guarded:
     """A strategy whose mistakes become a CorampError that names it, in one line."""
 
-    def __init__(self, strategy: Strategy, longest_s: float = LONGEST_DECISION_S) -> None:
+    def __init__(self, strategy: Guardable, longest_s: float = LONGEST_DECISION_S) -> None:
         self.name = strategy.name
-        self.period_s = period_of(strategy)
+        self.period_s = _period_checked(strategy)
         self.metered = is_metered(strategy)
         self._strategy = strategy
         self._longest_s = longest_s
@@ -79,6 +88,8 @@ def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Dec
         return cast("Decider", chosen(**(settings or {})))
     try:
         return Guarded(chosen(**(settings or {})))
+    except CorampError:
+        raise
     except Exception as error:
         raise CorampError(f"strategy {name}: raises {type(error).__name__}: {error}") from error
 
@@ -103,6 +114,18 @@ def time_limit(longest_s: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+def _period_checked(strategy: Guardable) -> float | None:
+    period_s: Any = period_of(strategy)
+    if period_s is None:
+        return None
+    if isinstance(period_s, int | float) and SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
+        return float(period_s)
+    raise CorampError(
+        f"strategy {strategy.name}: period_s: {period_s!r} cannot be; allowed is a number from "
+        f"{SHORTEST_PERIOD_S:g} to {LONGEST_PERIOD_S:g}"
+    )
 
 
 def _wrong_with(decision: Any, view: View) -> str:
