@@ -19,6 +19,7 @@ from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.feedback import place_on_mainline
 from coramp.strategies.ladder import decide_first, plan_of
+from coramp.strategies.least_effort_planner import LeastEffort
 from coramp.strategies.rungs import come_late, create, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
@@ -33,6 +34,7 @@ from coramp.strategies.situation import (
     ramp_neighbours,
 )
 
+LEAST_EFFORT = LeastEffort()
 LATER_FIRST = 0.25
 """Of two gaps as far from the chosen one, the later is tried first."""
 
@@ -88,19 +90,37 @@ def ramp_crossings_s(
     return rows[:n], crossing_s[:n]
 
 
-def decide_in_sequence(sequencer: Sequencer, view: View, memory: Memory) -> Decision:
+def decide_in_sequence(
+    sequencer: Sequencer,
+    view: View,
+    memory: Memory,
+    least_effort: LeastEffort = LEAST_EFFORT,
+    *,
+    later_only: bool = False,
+) -> Decision:
     """Returns the decision for the first subject, in the gap that the sequencer chooses.
 
-    If that cannot be driven, the gaps around it are tried, nearest first.
+    In each gap the trajectories of least effort come first, then those of the ladder's rungs. If
+    neither can be driven, the gaps around it are tried, nearest first, or only later ones.
     """
 
     def planner(
         fleet: Fleet, row: int, now_s: float, fastest_entry_mps: float, packed_rules: FloatArray
     ) -> tuple[MergePlan, Proposal, bool, int]:
-        from_s = now_s + view.rules.control.actuation_delay_s
-        seen = crossings(fleet, row, from_s, view.rules)
-        gaps = gaps_around(sequencer(seen), len(seen.mainline_s) + 1)
-        return plan_in_gaps(fleet, row, now_s, fastest_entry_mps, gaps, packed_rules)
+        rules = view.rules
+        situation = assess(fleet, row, now_s, fastest_entry_mps, rules)
+        seen = crossings(fleet, row, situation.from_s, rules)
+        chosen, count = sequencer(seen), len(seen.mainline_s) + 1
+        gaps = np.arange(chosen, count) if later_only else gaps_around(chosen, count)
+        for place in range(len(gaps)):
+            plan, proposal = least_effort.plan(fleet, situation, int(gaps[place]), rules)
+            if plan is not None:
+                return plan, proposal, *ramp_neighbours(fleet, row, situation.from_s)
+            one = gaps[place : place + 1]
+            answer = plan_in_gaps(fleet, row, now_s, fastest_entry_mps, one, packed_rules)
+            if answer[0].rung != RUNG_HOLD:
+                return answer
+        return plan_in_gaps(fleet, row, now_s, fastest_entry_mps, gaps[:0], packed_rules)
 
     return decide_first(planner, view, memory)
 
@@ -135,7 +155,7 @@ def plan_in_gaps(
         rung, scenario, merge = RUNG_REACH, 0, reach(fleet, proposal, situation, gap, rules)
         if merge.gap >= 0 and merge.accel_mps2 == situation.free_accel_mps2:
             rung = RUNG_FREE
-        for moves in (2, 3, 1):
+        for moves in (1, 2, 3):
             if merge.gap < 0:
                 rung, scenario = RUNG_CREATE, moves
                 merge = create(fleet, proposal, situation, gap, moves, rules)
