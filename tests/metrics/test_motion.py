@@ -3,11 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coramp.core.trajectory import build
 from coramp.metrics.motion import (
     binned_motion,
     distance_of_each_m,
     fuel_of_each_l,
     hardest_braking_mps2,
+    largest_jerk_mps3,
     pieces_of_samples,
 )
 
@@ -150,3 +152,28 @@ def test_no_samples_are_no_pieces():
     first, rows = pieces_of_samples(np.empty(0, np.int64), none, none, none, 2)
     assert first.tolist() == [0, 0, 0]
     assert rows.shape == (0, 4)
+
+
+def test_the_largest_jerk_by_hand():
+    # from -2 to +3 m/s2 at 4 s: over 1 s before and after, 5 m/s3; nowhere is it more
+    rows = build(0.0, 0.0, 20.0, [(0.0, 2.0), (-2.0, 2.0), (3.0, 2.0), (0.0, 3.0)])
+    first = np.array([0, len(rows)])
+    assert largest_jerk_mps3(first, rows, np.array([9.0])) == pytest.approx(5.0)
+    # one that is over before a second has passed on both sides has none
+    assert largest_jerk_mps3(first, rows, np.array([1.5])) == 0.0
+    # half a second of braking between cruises: 1 m/s lost within 1 s, whichever second it is
+    rows = build(0.0, 0.0, 20.0, [(0.0, 3.0), (-2.0, 0.5), (0.0, 5.0)])
+    assert largest_jerk_mps3(np.array([0, len(rows)]), rows, np.array([8.0])) == pytest.approx(1.0)
+
+
+def test_the_largest_jerk_is_that_of_close_sampling():
+    random = np.random.default_rng(3)
+    stretches = list(zip(random.normal(size=30), random.uniform(0.1, 2.0, 30), strict=True))
+    rows = build(0.0, 0.0, 60.0, stretches)
+    end_s = rows[-1, 0]
+    t = np.arange(1.0, end_s - 1.0, 0.001)
+    before, now, after = (np.interp(t + lag, rows[:, 0], rows[:, 2]) for lag in (-1.0, 0.0, 1.0))
+    sampled = np.abs(after - 2.0 * now + before).max()
+    found = largest_jerk_mps3(np.array([0, len(rows)]), rows, np.array([end_s]))
+    assert found == pytest.approx(sampled, abs=5e-3)
+    assert found >= sampled - 1e-9

@@ -9,7 +9,7 @@ from coramp.core.fuel import trajectory_fuel_l
 from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_end_s
 
 BIN_S = 1.0
-JERK_GRID_S = 0.1
+JERK_S = 1.0
 
 
 @kernel
@@ -81,27 +81,43 @@ def hardest_braking_mps2(rows: FloatArray) -> float:
 def largest_jerk_mps3(first: IntArray, rows: FloatArray, until_s: FloatArray) -> float:
     """Returns the largest change of acceleration (m/s3) of all vehicles, over 1 s.
 
-    ``|v(t + 1) - 2 v(t) + v(t - 1)| / (1 s)^2``, at the times of a grid: accelerations that jump,
-    as planned and commanded ones do, have no other finite jerk.
+    ``|v(t + 1) - 2 v(t) + v(t - 1)| / (1 s)^2``: accelerations that jump, as planned and commanded
+    ones do, have no other finite jerk. Speeds are lines between knots, so that it is largest where
+    a knot lies at t or 1 s from it.
     """
     largest = 0.0
-    lag = round(1.0 / JERK_GRID_S)
     for i in range(len(until_s)):
-        pieces = rows[first[i] : first[i + 1]]
-        if len(pieces) == 0 or not until_s[i] > pieces[0, TIME]:
-            continue
-        count = int((until_s[i] - pieces[0, TIME]) / JERK_GRID_S) + 1
-        speeds_mps = np.empty(count)
-        k = 0
-        for j in range(count):
-            now_s = pieces[0, TIME] + j * JERK_GRID_S
-            while k + 1 < len(pieces) and pieces[k + 1, TIME] <= now_s:
-                k += 1
-            speeds_mps[j] = pieces[k, SPEED] + pieces[k, ACCEL] * (now_s - pieces[k, TIME])
-        for j in range(lag, count - lag):
-            second = speeds_mps[j + lag] - 2.0 * speeds_mps[j] + speeds_mps[j - lag]
-            largest = max(largest, abs(second))
+        times_s, speeds_mps = (
+            rows[first[i] : first[i + 1], TIME],
+            rows[first[i] : first[i + 1], SPEED],
+        )
+        accels_mps2 = rows[first[i] : first[i + 1], ACCEL]
+        for k in range(len(times_s)):
+            for lag_s in (-JERK_S, 0.0, JERK_S):
+                now_s = times_s[k] + lag_s
+                if now_s - JERK_S < times_s[0] or now_s + JERK_S > until_s[i]:
+                    continue
+                second = (
+                    _speed_at(times_s, speeds_mps, accels_mps2, now_s + JERK_S)
+                    - 2.0 * _speed_at(times_s, speeds_mps, accels_mps2, now_s)
+                    + _speed_at(times_s, speeds_mps, accels_mps2, now_s - JERK_S)
+                )
+                largest = max(largest, abs(second) / JERK_S**2)
     return largest
+
+
+@kernel
+def _speed_at(
+    times_s: FloatArray, speeds_mps: FloatArray, accels_mps2: FloatArray, now_s: float
+) -> float:
+    low, high = 0, len(times_s)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times_s[middle] <= now_s:
+            low = middle
+        else:
+            high = middle
+    return float(speeds_mps[low] + accels_mps2[low] * (now_s - times_s[low]))
 
 
 def pieces_of_samples(
