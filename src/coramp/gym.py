@@ -16,6 +16,7 @@ from coramp._registration import register
 from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
 from coramp.core.fleet import Fleet
+from coramp.core.ramp_acceleration import lag_m
 from coramp.core.rules import Rules, packed, unpacked
 from coramp.core.trajectory import station_and_speed
 from coramp.errors import CorampError
@@ -80,7 +81,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     **Agents.** ``agents="one"``: the first ramp vehicle that enters after 30 s; the others follow
     the strategy ``others``. ``agents="all"``: every ramp vehicle, the foremost ``slots`` of those
-    before their merge at a time, front first.
+    before the nose at a time, front first.
 
     **Action**, shape (1,) or (slots,), from -1 to 1: the acceleration for a step as a share of the
     hardest, of ``comfort_mps2`` (2.94) below 0 and of ``speed_up_mps2`` (1.5) above. The supervisor
@@ -93,14 +94,16 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     on the mainline is (``strategies.feedback.Platoon``; negative behind), and that place's speed.
     Who is not there counts as 400 m away at the speed of the lane. Rows without an agent are 0.
 
-    **Reward** of a step, summed over agents: ``-(1 - v / v_d) period_s``, the time lost in s, less
-    ``0.02 u^2 period_s``, less 1 for each command that the supervisor refused. v_d is v_R0 before
-    the nose, v0 behind it.
+    **Reward** of a step, summed over agents: the time lost (s, as a negative number) against v_R0,
+    in the last step also what its committed merge will lose from there to the zone's end against
+    free movement; less ``0.02 u^2 period_s``; less 1 for a command that the supervisor refused. So
+    an episode's sum is the agent's delay, its effort and its refusals, all negative.
 
-    **End.** Terminated once the agent (all ramp vehicles) has merged; truncated after
-    ``longest_s`` (600). A merge once committed is only replaced by another that is safe. ``loop``
-    is the coordinator underneath; ``info`` has ``time_s``, ``interventions`` and ``rows``, the
-    agents' rows in the ledger. The same seed gives the same traffic.
+    **End.** Terminated once the agent (all ramp vehicles) is past the nose, from where it drives as
+    committed; truncated after ``longest_s`` (600). A merge once committed is only replaced by
+    another that is safe. ``loop`` is the coordinator underneath; ``info`` has ``time_s``,
+    ``interventions`` and ``rows``, the agents' rows in the ledger. The same seed gives the same
+    traffic.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
@@ -137,6 +140,8 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._hold_s = self._period * self._step_s
         self._longest = round(longest_s / self._step_s)
         self._packed = packed(self._rules)
+        road, accel_mps2 = self._rules.road, self._rules.motion.free_acceleration_mps2
+        self._lag_m = lag_m(road.mainline_speed_mps, road.ramp_speed_mps, accel_mps2)
         self._everyone = agents == "all"
         self._slots = slots if self._everyone else 1
         self._others = strategy_named(others)
@@ -174,9 +179,9 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         before_m = self._seen.features[: len(rows), STATION_FEATURE]
         self._now += self._period
         loop.run(self._now)
+        self._seen = self._look()
         reward = self._reward(rows, before_m, accel_mps2)
         reward -= INTERVENTION_COST * (loop.interventions - refused)
-        self._seen = self._look()
         over = self._now - self._started >= self._longest
         return self._observation(), reward, self._ended(), over, self._info()
 
@@ -221,13 +226,17 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def _reward(self, rows: list[int], before_m: FloatArray, accel_mps2: FloatArray) -> float:
         road, ledger, reward = self._rules.road, self.loop.ledger, 0.0
-        now_s = self._now * self._step_s
+        now_s, still = self._now * self._step_s, set(self._seen.rows.tolist())
         for row, was_m, accel in zip(rows, before_m.tolist(), accel_mps2.tolist(), strict=False):
             is_m, _ = station_and_speed(ledger.trajectory(row), now_s)
             on_ramp_m = min(0.0, is_m) - min(0.0, was_m)
             wished_s = on_ramp_m / road.ramp_speed_mps
             wished_s += (is_m - was_m - on_ramp_m) / road.mainline_speed_mps
             reward += wished_s - self._hold_s - ACTION_WEIGHT * accel * accel * self._hold_s
+            if row not in still:
+                way_m = road.mainline_end_m + self._lag_m - max(0.0, is_m)
+                to_come_s = ledger.exit_time_s(row) - now_s
+                reward += way_m / road.mainline_speed_mps - to_come_s
         return reward
 
     def _ended(self) -> bool:
@@ -246,9 +255,8 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
 
 def _bounds(rules: Rules, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     fastest_mps = rules.road.mainline_speed_mps * (1.0 + rules.motion.speed_deviation)
-    lane_m = rules.road.acceleration_lane_m
     low = [0.0, rules.road.ramp_start_m, 0.0, 0.0, 0.0] + [-FARTHEST_M, 0.0] * (2 * NEIGHBOURS)
-    high = [1.0, lane_m, fastest_mps, FARTHEST_M, fastest_mps]
+    high = [1.0, 0.0, fastest_mps, FARTHEST_M, fastest_mps]
     high += [FARTHEST_M, 2.0 * fastest_mps] * (2 * NEIGHBOURS)
     return (
         np.broadcast_to(np.array(low), shape).copy(),
@@ -260,7 +268,7 @@ def _bounds(rules: Rules, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArra
 def seen_by_agents(
     fleet: Fleet, at_s: float, wanted: int, slots: int, packed_rules: FloatArray
 ) -> tuple[FloatArray, IntArray]:
-    """Returns the features of ramp vehicles before their merge, front first, and their rows.
+    """Returns the features of ramp vehicles before the nose, front first, and their rows.
 
     ``wanted`` is the only row that is an agent, -1 makes all of them agents.
     """
@@ -273,12 +281,11 @@ def seen_by_agents(
     for k in range(len(platoon.rows)):
         if platoon.stage[k] == MAINLINE:
             continue
-        if n < slots and wanted in (-1, platoon.rows[k]):
+        if n < slots and platoon.stage[k] == RAMP and wanted in (-1, platoon.rows[k]):
             rows[n] = platoon.rows[k]
-            wish_mps = road.ramp_speed_mps if platoon.stage[k] == RAMP else road.mainline_speed_mps
             own = features[n]
             own[0], own[1], own[2] = 1.0, platoon.station_m[k], platoon.speed_mps[k]
-            own[3], own[4] = FARTHEST_M, wish_mps
+            own[3], own[4] = FARTHEST_M, road.ramp_speed_mps
             if last_on_ramp >= 0:
                 ahead_m = platoon.station_m[last_on_ramp] - platoon.length_m[last_on_ramp]
                 own[3] = ahead_m - platoon.station_m[k]
