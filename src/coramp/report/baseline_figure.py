@@ -15,7 +15,7 @@ from coramp.report.style import (
     legend_below,
     new_figure,
 )
-from coramp.studies.baseline_layout import CONTROLLED, GAP, settings_of
+from coramp.studies.baseline_layout import CONTROLLED, GAP, LANE, settings_of
 from coramp.studies.statistics import estimate
 
 FLOW = ["mainline_veh_h", "ramp_veh_h"]
@@ -80,7 +80,11 @@ def _draw_baselines(
                 linestyle="",
                 label=f"no control, {population} drivers, one a baseline",
             )
-    ours = [row for row in rows if row["strategy"] == CONTROLLED and row["said"][GAP] == 0.0]
+    ours = [
+        row
+        for row in rows
+        if row["strategy"] == CONTROLLED and row["said"][GAP] == 0.0 and _on_own_lane(row)
+    ]
     means = [estimate([row["delay_s"] for row in _at(ours, flow)]).mean for flow in places]
     axes.plot(list(places.values()), means, color=BLUE, marker="o", label="mainline priority")
     axes.set_xticks(list(places.values()), [f"{m:g}\n+ {r:g}" for m, r in places])
@@ -91,13 +95,17 @@ def _at(rows: list[dict[str, Any]], flow: tuple[float, float]) -> list[dict[str,
     return [row for row in rows if (row[FLOW[0]], row[FLOW[1]]) == flow]
 
 
+def _on_own_lane(row: dict[str, Any]) -> bool:
+    return LANE not in (row["overrides"] or "")
+
+
 def _draw_gaps(axes: Axes, rows: list[dict[str, Any]]) -> None:
     for kind, (label, colour, marker, line) in KINDS.items():
         found: dict[float, list[float]] = {}
         for row in rows:
             if row["drivers"] and row["said"]["car_following"] == kind:
                 found.setdefault(row["said"]["tau_s"], []).append(row["delay_s"])
-            elif row["strategy"] == kind and "acceleration_lane" not in (row["overrides"] or ""):
+            elif row["strategy"] == kind and _on_own_lane(row):
                 found.setdefault(row["said"][GAP], []).append(row["delay_s"])
         gaps = sorted(found)
         estimates = [estimate(found[gap]) for gap in gaps]

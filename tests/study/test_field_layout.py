@@ -1,0 +1,201 @@
+"""Tables of the studies field and baseline, by hand."""
+
+import math
+
+import polars as pl
+import pytest
+
+from coramp.metrics.schemas import RUNS
+from coramp.report.baseline_figure import baseline_figure
+from coramp.report.field_figure import field_figure
+from coramp.strategies.registry import strategies
+from coramp.studies.baseline_layout import baseline_tables, settings_of
+from coramp.studies.definition import count_runs, expand, load_study
+from coramp.studies.field_layout import (
+    METRICS,
+    Metric,
+    field_tables,
+    mean_of,
+    paired_difference,
+    pareto_front,
+    ranks,
+    with_derived,
+)
+from coramp.studies.statistics import estimate
+from tests.study import run_row, runs_of
+
+FLOWS = [(800.0, 200.0), (2200.0, 700.0)]
+
+
+def field_row(strategy, flow, seed, mainline_s, ramp_s, fuel_l, **more):
+    return run_row(
+        strategy,
+        *flow,
+        seed=seed,
+        drivers="fair" if strategy in ("uncontrolled", "alinea") else None,
+        vehicles_mainline=300,
+        vehicles_ramp=100,
+        mainline_delay_s=mainline_s,
+        ramp_delay_s=ramp_s,
+        fuel_l=fuel_l,
+        **more,
+    )
+
+
+@pytest.fixture
+def field():
+    rows = []
+    for seed in (1, 2):
+        for flow in FLOWS:
+            rows += [
+                field_row("uncontrolled", flow, seed, 4.0 + seed, 2.0, 20.0),
+                field_row("ocbf", flow, seed, 1.0, 0.0, 18.0, interventions=5),
+                field_row("game", flow, seed, 1.0 + seed, 1.0, 16.0),
+                field_row("alinea", flow, seed, 3.0, 90.0, 21.0),
+            ]
+    return runs_of(*rows)
+
+
+def test_the_delay_of_all_weighs_every_vehicle(field):
+    runs = with_derived(field)
+    # seeds 1 and 2: (3 x 5 + 2) / 4 and (3 x 6 + 2) / 4
+    assert mean_of(runs, "uncontrolled", "delay_s").mean == pytest.approx(0.5 * (17 / 4 + 20 / 4))
+    assert mean_of(runs, "game", "fuel_ml").mean == pytest.approx(40.0)
+
+
+def test_differences_are_paired_by_seed(field):
+    runs = with_derived(field)
+    found = paired_difference(runs, "game", "delay_s")
+    # (3 (1 + seed) + 1 - 3 (4 + seed) - 2) / 4: the same for both seeds, so that it is sure
+    assert found.mean == pytest.approx(-2.5)
+    assert found.half_width == pytest.approx(0.0, abs=1e-9)
+    spread = paired_difference(runs, "ocbf", "delay_s")
+    assert spread.half_width == pytest.approx(12.706 * 0.75 / 2.0, rel=1e-3)
+
+
+def test_who_has_no_value_for_a_seed_is_left_out(field):
+    broken = field.filter(~((pl.col("strategy") == "game") & (pl.col("seed") == 2)))
+    assert mean_of(with_derived(broken), "game", "delay_s").values == 1
+
+
+def test_the_front_by_hand():
+    points = [("a", 1.0, 5.0), ("b", 2.0, 2.0), ("c", 2.0, 3.0), ("d", 5.0, 1.0), ("e", 5.0, 5.0)]
+    assert pareto_front(points) == ["a", "b", "d"]
+    assert pareto_front([("a", 1.0, 1.0), ("b", 1.0, 1.0)]) == ["a", "b"]
+
+
+def test_ranks_by_hand():
+    found = {name: estimate([value]) for name, value in (("a", 2.0), ("b", 1.0), ("c", 1.001))}
+    found["d"] = estimate([])
+    assert ranks(Metric("", ""), found) == {"a": 3, "b": 1, "c": 1}
+    assert ranks(Metric("", "", True), found) == {"a": 1, "b": 2, "c": 2}
+
+
+def test_the_tables_of_the_field(field):
+    tables = {table.title: table for table in field_tables(field)}
+    assert [title.split(",")[0] for title in tables] == [
+        "Delay by flow (s)",
+        "Delay less that of drivers",
+        *["All metrics", "Less uncontrolled (fair drivers)", "Ranks"] * 2,
+    ]
+    by_flow = tables["Delay by flow (s)"]
+    assert by_flow.columns == ("strategy", "800 + 200", "2200 + 700")
+    assert [row[0] for row in by_flow.rows] == ["uncontrolled", "alinea", "game", "ocbf"]
+    for table in tables.values():
+        assert all(len(row) == len(table.columns) for row in table.rows)
+    ranked = {row[0]: row for row in tables["Ranks, flows beyond capacity"].rows}
+    assert [name for name, row in ranked.items() if row[-1] == "yes"] == ["game", "ocbf"]
+    interventions = 1 + [m.column for m in METRICS].index("interventions")
+    all_metrics = {row[0]: row for row in tables["All metrics, flows beyond capacity"].rows}
+    assert all_metrics["ocbf"][interventions] == "5.0 ± 0.0"
+
+
+def test_the_field_has_every_strategy_at_twelve_flows():
+    study = load_study("field")
+    specs = expand(study, 1)
+    assert {spec.strategy for spec in specs} == set(strategies())
+    assert count_runs(study, 10) == 10 * 12 * len(strategies())
+    assert len({(s.scenario.mainline.flow_veh_h, s.scenario.ramp.flow_veh_h) for s in specs}) == 12
+
+
+def test_the_figure_of_the_field_draws_what_there_is(field):
+    figure = field_figure(field)
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["no control, fair drivers", "ALINEA", "game", "OCBF"]
+    xs = [float(c.lines[0].get_xdata()[0]) for c in figure.axes[1].containers]
+    assert xs == pytest.approx([50.0, 52.5, 40.0, 45.0] * 2)
+
+
+def baseline_rows():
+    flow = (1800.0, 500.0)
+    made = [
+        ("mainline-priority", None, None, 0.2),
+        ("mainline-priority", None, "ramp.acceleration_lane_m=120.0", 0.5),
+        ("mainline-priority", None, "safety.time_gap_s=0.6", 0.4),
+        ("uncontrolled", "fair", None, 2.0),
+        ("uncontrolled", "fair", "drivers.fair.sigma=0.0", 1.0),
+        ("uncontrolled", "fair", "drivers.fair.sigma=0.0 ramp.acceleration_lane_m=120.0", 5.0),
+        ("uncontrolled", "paper", "drivers.paper.integrator=ballistic", 0.05),
+        ("uncontrolled", "fair", "drivers.fair.car_following=ACC drivers.fair.tau_s=0.6", 8.0),
+    ]
+    return runs_of(
+        *(
+            run_row(
+                strategy,
+                *flow,
+                drivers=drivers,
+                overrides=overrides,
+                vehicles_mainline=300,
+                vehicles_ramp=100,
+                mainline_delay_s=delay_s,
+                ramp_delay_s=delay_s / 2.0,
+            )
+            for strategy, drivers, overrides, delay_s in made
+        )
+    )
+
+
+def test_settings_are_the_scenarios_but_for_the_overrides():
+    row = {"scenario": "paper", "drivers": "fair", "overrides": "drivers.fair.sigma=0.0"}
+    found = settings_of(row)
+    assert (found["sigma"], found["integrator"], found["tau_s"]) == (0.0, "euler", 1.0)
+    assert found["ramp.acceleration_lane_m"] == 200.0
+
+
+def test_the_rate_against_each_baseline_by_hand():
+    rates, gaps = baseline_tables(baseline_rows())
+    assert rates.columns[5:] == ("1800 + 500: D_k (s)", "1800 + 500: I_r (%)")
+    assert rates.rows == (
+        ("fair", "120", "euler", "0", "1", "5.00", "90.0"),
+        ("fair", "200", "euler", "0", "1", "1.00", "80.0"),
+        ("fair", "200", "euler", "0.5", "1", "2.00", "90.0"),
+        ("paper", "200", "ballistic", "0.5", "1", "0.05", "-"),
+    )
+    assert gaps.rows == (
+        ("Eq. 1", "coordinated, mainline-priority", "0.20 / 0.10"),
+        ("0.6", "uncoordinated ACC", "8.00 / 4.00"),
+        ("0.6", "coordinated, mainline-priority", "0.40 / 0.20"),
+    )
+
+
+def test_the_figure_of_the_baseline_draws_every_baseline():
+    figure = baseline_figure(baseline_rows())
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert len(lines["no control, fair drivers, one a baseline"].get_xdata()) == 3
+    assert list(lines["mainline priority"].get_ydata()) == pytest.approx([0.175])
+    assert len(figure.axes) == 2
+
+
+def test_tables_of_nothing_are_empty():
+    nothing = pl.DataFrame(schema=RUNS)
+    assert baseline_tables(nothing) == []
+    assert all(not table.rows for table in field_tables(nothing))
+
+
+def test_the_baseline_study_has_all_combinations():
+    study = load_study("baseline")
+    drivers = [s for s in expand(study, 1) if s.drivers is not None]
+    krauss = [s for s in drivers if s.scenario.drivers[s.drivers].car_following == "Krauss"]
+    assert len(krauss) == 2 * 2 * 2 * 2 * 3 * 3
+    assert len(drivers) - len(krauss) == 2 * 3 * 4
+    assert not math.isnan(count_runs(study, 3))
