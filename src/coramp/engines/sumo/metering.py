@@ -10,21 +10,19 @@ from coramp.engines.sumo.session import GREEN, RED, YELLOW, Session
 from coramp.scenario import Scenario
 from coramp.strategies.base import Decider, Detectors, Memory, Reports, SetRampSignal, View
 
-MAINLINE_LOOP, QUEUE_LOOP, PASSAGE_LOOP = "mainline", "queue", "passage"
+MAINLINE_LOOP, QUEUE_LOOP = "mainline", "queue"
 QUEUE_LOOP_M = 20.0
 """How far behind its start the ramp has the loop that sees a queue too long for it."""
-PASSAGE_LOOP_M = 1.0
 SIGNAL, RAMP_LANE = "nose", "ramp_0"
 YELLOW_S = 2.0
 """Between green and red; who cannot stop in comfort by then goes on."""
 
 
 def loops(scenario: Scenario, period_s: float) -> str:
-    """Returns SUMO's file of loops: beside the acceleration lane, at the ramp's start and end."""
+    """Returns SUMO's file of loops: beside the acceleration lane and at the ramp's start."""
     places = (
         (MAINLINE_LOOP, "merge_1", scenario.detector_station_m),
         (QUEUE_LOOP, RAMP_LANE, min(QUEUE_LOOP_M, -0.25 * scenario.ramp.start_m)),
-        (PASSAGE_LOOP, "merge_0", PASSAGE_LOOP_M),
     )
     lines = [
         f'  <inductionLoop id="{name}" lane="{lane}" pos="{place_m!r}" period="{period_s!r}" '
@@ -46,6 +44,7 @@ class Meter:
         self._fastest_mps = scenario.fastest_mainline_entry_mps
         self._nobody = Ledger(rules.road.mainline_speed_mps, rules.road.mainline_end_m).fleet
         self._red_s = math.inf
+        self._on_ramp: set[str] = set()
         session.set_signal(SIGNAL, RAMP_LANE, GREEN)
 
     def decide(self, time_s: float) -> None:
@@ -62,10 +61,10 @@ class Meter:
 
     def _view(self, time_s: float) -> View:
         session = self._session
+        waiting = session.vehicles_on(RAMP_LANE)
+        passed, self._on_ramp = len(self._on_ramp - waiting), waiting
         seen = Detectors(
-            session.loop_occupancy(MAINLINE_LOOP),
-            session.loop_occupancy(QUEUE_LOOP),
-            session.loop_count(PASSAGE_LOOP),
+            session.loop_occupancy(MAINLINE_LOOP), session.loop_occupancy(QUEUE_LOOP), passed
         )
         return View(
             time_s,

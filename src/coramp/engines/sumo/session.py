@@ -126,9 +126,9 @@ class Session:
         """Returns the share of its last period for which a loop was occupied."""
         return float(libsumo.inductionloop.getLastIntervalOccupancy(loop)) / 100.0
 
-    def loop_count(self, loop: str) -> int:
-        """Returns how many vehicles passed a loop in its last period."""
-        return int(libsumo.inductionloop.getLastIntervalVehicleNumber(loop))
+    def vehicles_on(self, lane: str) -> set[str]:
+        """Returns who is on a lane now."""
+        return set(libsumo.lane.getLastStepVehicleIDs(lane))
 
     def _act_now(self, vehicle_id: str) -> None:
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
