@@ -123,9 +123,14 @@ def run_table(summary: Row) -> Table:
         rungs = ("free", "reach", "create", "delay", "hold")
         lines += [
             ("largest difference between plan and SUMO (m)", number(summary["plan_error_m"], 4)),
-            ("ramp vehicles by rung", ", ".join(f"{r} {summary[f'rung_{r}']}" for r in rungs)),
-            ("vehicles adjusted for others", str(summary["adjusted_vehicles"])),
+            ("commands that were not safe and replaced", str(summary["interventions"])),
         ]
+        if any(summary[f"rung_{rung}"] for rung in rungs):
+            by_rung = ", ".join(f"{rung} {summary[f'rung_{rung}']}" for rung in rungs)
+            lines += [
+                ("ramp vehicles by rung", by_rung),
+                ("vehicles adjusted for others", str(summary["adjusted_vehicles"])),
+            ]
     lines.append(("computed in (s)", number(summary["wall_s"])))
     title = (
         f"{summary['scenario']}: {who}, {summary['mainline_veh_h']:g} + {summary['ramp_veh_h']:g} "

@@ -72,6 +72,10 @@ class Quantity:
         return f"{self.value:.4f} {self.unit}".strip()
 
 
+EVEN_M = 1e-3
+"""A merge station this near to that of Eq. 28 is that of Eq. 28."""
+
+
 @dataclass(frozen=True)
 class _Case:
     """A decision in the paper's symbols; stations at time 0, nan for none."""
@@ -107,11 +111,38 @@ def quantities(decision: Mapping[str, Any], scenario: Scenario) -> list[Quantity
     if not math.isnan(case.accel_mps2):
         if decision["rung"] == "delay":
             case = _delayed(case)
+        if not _accelerates_evenly(case, decision["merge_station_m"]):
+            return _known([*lines, *_least_effort(case, decision["merge_station_m"])])
+        if decision["rung"] == "delay":
             lines.append(Quantity("24", "t_1", "time to the nose, delayed", case.t1_s, "s"))
         lines += _acceleration(case)
         if case.scenario:
             lines += _creation(case)
+    return _known(lines)
+
+
+def _known(lines: list[Quantity]) -> list[Quantity]:
     return [line for line in lines if isinstance(line.value, bool) or not math.isnan(line.value)]
+
+
+def _accelerates_evenly(case: _Case, merge_station_m: float) -> bool:
+    """Whether the merge is that of Eq. 28, with one acceleration from the nose on."""
+    t2_s = case.merge_s - case.t1_s
+    even_m = case.nose_mps * t2_s + 0.5 * case.accel_mps2 * t2_s * t2_s
+    return abs(even_m - merge_station_m) < EVEN_M
+
+
+def _least_effort(case: _Case, merge_station_m: float) -> list[Quantity]:
+    """Of a merge whose way is planned as a whole, from the decision on."""
+    return [
+        Quantity("", "L", "gap between X and Y", case.gap_m, "m"),
+        Quantity("36", "dL", "way that X or Y is moved", case.shift_m, "m"),
+        Quantity(
+            "", "u", "largest acceleration on the way of least effort", case.accel_mps2, "m/s2"
+        ),
+        Quantity("", "", "merge station", merge_station_m, "m"),
+        Quantity("", "", "merge time", case.merge_s, "s"),
+    ]
 
 
 def _case_of(decision: Mapping[str, Any], scenario: Scenario) -> _Case:

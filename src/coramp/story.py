@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.explanation import Quantity, quantities
+from coramp.explanation import EVEN_M, Quantity, quantities
 from coramp.metrics.tables import Row
 from coramp.run_folder import StoredRun, moved_for, read_run
 
@@ -54,6 +54,13 @@ def story_in(run: StoredRun, vehicle_id: str, folder: Path | None = None) -> Sto
     )
 
 
+def accelerates_evenly(decision: Row) -> bool:
+    """Returns whether a merge has one acceleration from the nose on, as the paper's have."""
+    t2_s = decision["merge_time_s"] - decision["nose_time_s"]
+    even_m = decision["nose_speed_mps"] * t2_s + 0.5 * decision["accel_mps2"] * t2_s * t2_s
+    return bool(abs(even_m - decision["merge_station_m"]) < EVEN_M)
+
+
 def told(decision: dict[str, Any]) -> str:
     """Returns in one sentence what a decision was."""
     front, rear = decision["front_vehicle_id"], decision["rear_vehicle_id"]
@@ -68,6 +75,8 @@ def told(decision: dict[str, Any]) -> str:
             where = f"between {front} and {rear}"
     moved = ", ".join(decision["adjusted_vehicle_ids"] or [])
     match decision["rung"]:
+        case "free" | "reach" if not accelerates_evenly(decision):
+            how = "a way of least effort leads into a gap: it merges"
         case "free":
             how = "free movement is safe as it is: it merges"
         case "reach":
