@@ -11,10 +11,11 @@ import coramp
 import coramp.api
 import coramp.report.drawn_runs
 from coramp import CorampError
-from coramp.report.figures import CAPACITY_LEFT_OUT, save_figures
+from coramp.report.figures import LEFT_OUT, LONG_STUDIES, save_figures
 from coramp.report.study_folder import read_study
 from tests.edges import assert_refused, everything_below, invoke
 
+ALL_LEFT_OUT = LEFT_OUT.format(", ".join(LONG_STUDIES))
 NAMES = [
     "fig04-collision-acceleration",
     "fig06-09-positions",
@@ -83,8 +84,8 @@ def test_what_was_drawn_and_what_not_is_told_and_progress_apart(drawn):
     out, told = drawn
     lines = told.out.splitlines()
     assert lines[: len(NAMES)] == [f"{name}: svg, png" for name in NAMES]
-    assert lines[-2:] == [f"12 figures in {out}.", f"Note: {CAPACITY_LEFT_OUT}."]
-    assert "--study out/capacity" in lines[-1]
+    assert lines[-2:] == [f"12 figures in {out}.", f"Note: {ALL_LEFT_OUT}."]
+    assert "--study out/NAME" in lines[-1]
     assert "9 of 9 runs" in told.err
 
 
@@ -199,8 +200,7 @@ def test_runs_that_failed_are_told(studies, tmp_path, monkeypatch):
     drawn = save_figures(tmp_path, stored, [])
     assert drawn.notes == (
         f"3 runs of {studies['paper']} failed and are not drawn",
-        CAPACITY_LEFT_OUT,
+        ALL_LEFT_OUT,
     )
-    assert save_figures(tmp_path, {**stored, "capacity": stored["sensitivity"]}, []).notes == (
-        drawn.notes[0],
-    )
+    with_capacity = save_figures(tmp_path, {**stored, "capacity": stored["sensitivity"]}, [])
+    assert with_capacity.notes == (drawn.notes[0], LEFT_OUT.format("field, baseline"))

@@ -32,8 +32,8 @@ LONG_STUDIES = {
 }
 """Figures of studies that take some ten minutes; they are drawn where the study is given."""
 LEFT_OUT = (
-    "{0} is not drawn: its study takes some ten minutes; run coramp study {0}, then add "
-    "--study out/{0}"
+    "not drawn: {}; their studies take some ten minutes and more: run coramp study NAME, then add "
+    "--study out/NAME"
 )
 
 
@@ -64,7 +64,8 @@ def save_figures(
         for stored in studies.values()
         if stored.failed
     ]
-    notes += [LEFT_OUT.format(layout) for layout in LONG_STUDIES if layout not in studies]
+    if left_out := [layout for layout in LONG_STUDIES if layout not in studies]:
+        notes.append(LEFT_OUT.format(", ".join(left_out)))
     return FigureSet(folder, files, tuple(notes))
 
 
