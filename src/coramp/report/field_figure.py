@@ -11,9 +11,9 @@ from coramp.studies.field_layout import (
     DELAY,
     FUEL,
     WITHIN,
+    front_of,
     mean_of,
     names_of,
-    pareto_front,
     ranges,
     with_derived,
 )
@@ -37,9 +37,7 @@ def field_figure(runs: pl.DataFrame) -> Figure:
     for k, (title, part) in enumerate(ranges(known)):
         colour, marker = (BLUE, "o") if title == WITHIN else (VERMILION, "D")
         there = [name for name in names if name in names_of(part)]
-        front = pareto_front(
-            (n, mean_of(part, n, DELAY).mean, mean_of(part, n, FUEL).mean) for n in there
-        )
+        front = front_of(part, there)
         for axes, column in zip(diagrams, SHOWN, strict=True):
             for name in there:
                 found = mean_of(part, name, column)

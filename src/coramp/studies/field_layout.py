@@ -121,6 +121,16 @@ def pareto_front(points: Iterable[tuple[str, float, float]]) -> list[str]:
     ]
 
 
+def front_of(runs: pl.DataFrame, names: Sequence[str]) -> list[str]:
+    """Returns who is on the front of delay of all against fuel, as far as the tables' digits go."""
+    digits = {metric.column: metric.digits for metric in METRICS}
+
+    def figure(name: str, column: str) -> float:
+        return round(mean_of(runs, name, column).mean, digits[column])
+
+    return pareto_front((name, figure(name, DELAY), figure(name, FUEL)) for name in names)
+
+
 def _by_flow(runs: pl.DataFrame) -> Table:
     flows = sorted(runs.select(FLOW).unique().iter_rows())
     rows = [
@@ -176,9 +186,7 @@ def _ranks(title: str, runs: pl.DataFrame) -> Table:
     places = [
         ranks(metric, {n: mean_of(runs, n, metric.column) for n in names}) for metric in METRICS
     ]
-    front = pareto_front(
-        (n, mean_of(runs, n, DELAY).mean, mean_of(runs, n, FUEL).mean) for n in names
-    )
+    front = front_of(runs, names)
     rows = [
         (name, *(str(place.get(name, "-")) for place in places), "yes" if name in front else "")
         for name in names
