@@ -159,11 +159,11 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     """
     options = options or SumoOptions()
     started = time.perf_counter()
-    settings = spec.scenario.strategy.get(spec.strategy)
-    strategy = Timed(strategy_to_run(spec.strategy, settings))
+    name = spec.strategy
+    strategy = Timed(strategy_to_run(name, spec.scenario.strategy.get(name)))
     if spec.engine == "exact":
         outcome = run_exact(spec.scenario, strategy, spec.seed)
-    elif strategy_named(spec.strategy).cooperative:
+    elif strategy_named(name).cooperative:
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:
         drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
