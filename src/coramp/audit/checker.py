@@ -20,6 +20,7 @@ from coramp.audit.reasons import (
     NO_SAFE_END,
     NOT_FINITE,
     STARTS_TOO_EARLY,
+    STARTS_TOO_LATE,
     TIMES_NOT_ASCENDING,
     TOO_FAST,
     TOO_HARD,
@@ -94,8 +95,7 @@ def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bound
             least = min(least, margin)
         for k_other in range(k + 1, len(change.rows)):
             theirs = _changed_way(vehicles, change, k_other)
-            both_from_s = max(from_s, theirs.pieces[0, 0])
-            code, margin = examine_pair(mine, theirs, both_from_s, bounds)
+            code, margin = examine_pair(mine, theirs, from_s, bounds)
             if code != ACCEPTED:
                 return Verdict(code, row, change.rows[k_other], margin)
             least = min(least, margin)
@@ -163,8 +163,11 @@ def _examine_form(pieces: FloatArray, merge_s: float) -> int:
 
 @kernel
 def _examine_start(pieces: FloatArray, start: FloatArray, earliest_s: float) -> int:
+    """A change replaces what was committed, so that it must say all that is driven from now on."""
     if pieces[0, 0] < earliest_s - JOIN:
         return STARTS_TOO_EARLY
+    if pieces[0, 0] > earliest_s + JOIN:
+        return STARTS_TOO_LATE
     for column in range(3):
         if abs(pieces[0, column] - start[column]) > JOIN:
             return LEAVES_ITS_PATH

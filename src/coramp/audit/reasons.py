@@ -15,7 +15,8 @@
     TOO_NEAR,
     TOO_NEAR_AT_MERGE,
     CHANGES_THE_PAST,
-) = range(14)
+    STARTS_TOO_LATE,
+) = range(15)
 
 REASONS = (
     "accepted",
@@ -32,6 +33,7 @@ REASONS = (
     "comes nearer than the safe distance of Eq. 1",
     "comes nearer than Eq. 15 or 16 at the lane change",
     "changes a lane change that has happened, or the stream",
+    "starts later than the vehicle can act: what it drives until then is missing",
 )
 
 JOIN = 1e-6
