@@ -1,14 +1,11 @@
 """Holds a strategy that is not coramp's own to the interface: what it may answer, and how long."""
 
-import signal
-import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any, Protocol, cast
 
 import numpy as np
 
-from coramp._kernel import compiling
+from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.core.fleet import MAX_CHANGED
 from coramp.core.trajectory import MAX_PIECES
 from coramp.errors import CorampError
@@ -16,6 +13,7 @@ from coramp.strategies.base import (
     Decider,
     Decision,
     DriveWithAcceleration,
+    Explanation,
     FollowTrajectory,
     Memory,
     ReleaseToDriver,
@@ -25,16 +23,13 @@ from coramp.strategies.base import (
     period_of,
 )
 from coramp.strategies.registry import OURS, origin_of, strategy_named
+from coramp.strategies.situation import RUNGS
 
 LONGEST_DECISION_S = 10.0
 """Wall time after which a decision counts as one that never comes; compiling does not count."""
 SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.01, 3600.0
 MOST_AT_ONCE = 10_000
 """So many decisions at one time are a strategy that wakes itself without end."""
-
-
-class TooLong(BaseException):
-    """A decision takes too long; no ``except Exception`` of a strategy catches it."""
 
 
 class Guardable(Decider, Protocol):
@@ -62,20 +57,24 @@ class Guarded:
         """Returns what the strategy decides; raises CorampError where that cannot be used."""
         self._at_once = self._at_once + 1 if view.time_s == self._time_s else 0
         self._time_s = view.time_s
-        try:
-            with time_limit(self._longest_s):
-                decision = self._strategy.decide(view, memory)
-        except TooLong:
-            problem = f"takes longer than {self._longest_s:g} s to decide"
-        except Exception as error:  # noqa: BLE001 - it may raise anything
-            problem = f"raises {type(error).__name__}: {error}"
-        else:
-            problem = _wrong_with(decision, view)
+        decision, problem = self._asked(view, memory)
+        problem = problem or _wrong_with(decision, view)
         if self._at_once > MOST_AT_ONCE:
             problem = "wakes itself without end"
-        if problem:
+        if problem or decision is None:
             raise CorampError(f"strategy {self.name}: at {view.time_s:.1f} s it {problem}")
         return decision
+
+    def _asked(self, view: View, memory: Memory) -> tuple[Decision | None, str]:
+        try:
+            with time_limit(self._longest_s):
+                return self._strategy.decide(view, memory), ""
+        except TooLong:
+            return None, f"takes longer than {self._longest_s:g} s to decide"
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - it may raise anything, or exit
+            return None, _told(error)
 
 
 def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Decider:
@@ -87,33 +86,20 @@ def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Dec
     if origin_of(name) == OURS:
         return cast("Decider", chosen(**(settings or {})))
     try:
-        return Guarded(chosen(**(settings or {})))
-    except CorampError:
+        with time_limit(LONGEST_DECISION_S):
+            return Guarded(chosen(**(settings or {})))
+    except (CorampError, KeyboardInterrupt):
         raise
-    except Exception as error:
-        raise CorampError(f"strategy {name}: raises {type(error).__name__}: {error}") from error
+    except TooLong:
+        problem = f"takes longer than {LONGEST_DECISION_S:g} s to be made"
+    except BaseException as error:  # noqa: BLE001 - it may raise anything, or exit
+        problem = _told(error)
+    raise CorampError(f"strategy {name}: {problem}")
 
 
-@contextmanager
-def time_limit(longest_s: float) -> Iterator[None]:
-    """Raises TooLong inside the block after that time; only the main thread can be interrupted."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def give_up(*_: object) -> None:
-        if compiling():
-            signal.setitimer(signal.ITIMER_REAL, longest_s)
-            return
-        raise TooLong
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, longest_s)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+def _told(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return f"raises {type(error).__name__}: {text}" if text else f"raises {type(error).__name__}"
 
 
 def _period_checked(strategy: Guardable) -> float | None:
@@ -131,24 +117,46 @@ def _period_checked(strategy: Guardable) -> float | None:
 def _wrong_with(decision: Any, view: View) -> str:
     if not isinstance(decision, Decision):
         return f"returns {type(decision).__name__}; allowed is a Decision"
-    live = set(view.fleet.live.tolist())
+    try:
+        return _wrong_inside(decision, set(view.fleet.live.tolist()), view.time_s)
+    except (TypeError, ValueError, AttributeError) as error:
+        return f"returns what is no decision: {error}"
+
+
+def _wrong_inside(decision: Decision, live: set[int], now_s: float) -> str:
     moved = [command for command in decision.commands if isinstance(command, FollowTrajectory)]
     if len(moved) > MAX_CHANGED:
         return f"commands {len(moved)} trajectories; allowed are {MAX_CHANGED} at a time"
     rows = [command.row for command in decision.commands if hasattr(command, "row")]
-    wakes = [row for _, row in decision.wakes_s]
-    if unknown := [row for row in (*rows, *wakes) if row not in live]:
+    named = [*rows, *(row for _, row in decision.wakes_s)]
+    named += [explanation.row for explanation in decision.explanations]
+    if unknown := [row for row in named if not _is_row(row) or row not in live]:
         return f"commands an unknown vehicle, row {unknown[0]}"
     if len(set(rows)) < len(rows):
         return "commands a vehicle twice"
     for wake_s, _ in decision.wakes_s:
-        if not wake_s >= view.time_s or wake_s == np.inf:
+        if not now_s <= wake_s < np.inf:
             return f"asks to be woken at {wake_s} s; allowed is the present or later"
     try:
         hash(decision.memory)
     except TypeError:
         return "has a memory that is not hashable"
-    return next(filter(None, map(_wrong_command, decision.commands)), "")
+    problems = (*map(_wrong_command, decision.commands), *map(_wrong_story, decision.explanations))
+    return next(filter(None, problems), "")
+
+
+def _is_row(row: Any) -> bool:
+    return isinstance(row, int | np.integer) and not isinstance(row, bool)
+
+
+def _wrong_story(explanation: Explanation) -> str:
+    if explanation.rung not in RUNGS:
+        return f"explains itself by rung {explanation.rung!r}; allowed are {', '.join(RUNGS)}"
+    rest = (explanation.conflict_row, explanation.front_row, explanation.rear_row)
+    if not all(map(_is_row, rest)):
+        return "explains itself by rows that are no whole numbers"
+    sum(map(float, explanation[2:]))  # raises for what is no number
+    return ""
 
 
 def _wrong_command(command: Any) -> str:
