@@ -58,6 +58,8 @@ class Twice:
         earliest_s = view.time_s + view.rules.control.actuation_delay_s
         if command.pieces[0, 0] < earliest_s - 1e-9:
             raise AssertionError(f"{self.name} commands what should have begun already")
+        if command.pieces[0, 0] > earliest_s + 1e-9:
+            raise AssertionError(f"{self.name} leaves out what is driven before its first piece")
         if np.shares_memory(command.pieces, view.fleet.pieces):
             raise AssertionError(f"{self.name} commands with the view's own arrays")
 

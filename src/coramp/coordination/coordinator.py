@@ -43,6 +43,7 @@ from coramp.strategies.base import (
     Memory,
     View,
     period_of,
+    steps_of_period,
 )
 
 
@@ -103,7 +104,7 @@ class Coordinator:
         self._wakes: list[tuple[int, int]] = []
         self._announced = 0
         period_s = period_of(strategy)
-        self._period_steps = 0 if period_s is None else max(1, round(period_s / self._step_s))
+        self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
     def expect_arrivals(self) -> None:
         """Lets every arrival come at its step, and starts the strategy's own clock, if any."""

@@ -72,9 +72,11 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class FollowTrajectory:
-    """Follow these pieces from their first time on; merge at ``merge_time_s``.
+    """Follow these pieces; merge at ``merge_time_s``.
 
-    ``makes_gap`` tells that the vehicle moves aside for another.
+    They take the place of all that is committed, from the earliest time at which a vehicle can act,
+    ``time_s + actuation_delay_s``; their first time is that, their first station and speed what is
+    committed for then. ``makes_gap`` tells that the vehicle moves aside for another.
     """
 
     row: int
@@ -177,7 +179,9 @@ class Strategy(Decider, Protocol):
 
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
     by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
-    for one that needs a signal and detectors on the ramp, in SUMO.
+    for one that needs a signal and detectors on the ramp, in SUMO. One whose parameters must fit
+    together has a method ``problems()``, which returns lines ``parameter: what is wrong; what is
+    allowed``.
     """
 
     name: ClassVar[str]
@@ -188,6 +192,16 @@ class Strategy(Decider, Protocol):
 def period_of(strategy: Decider) -> float | None:
     """Returns in which period (s) a strategy is woken besides, None for one that only plans."""
     return getattr(strategy, "period_s", None)
+
+
+def steps_of_period(period_s: float, step_s: float) -> int:
+    """Returns how many steps of the control clock a period takes, to the nearest, at least 1."""
+    return max(1, round(period_s / step_s))
+
+
+def held_period_s(period_s: float, rules: Rules) -> float:
+    """Returns the time (s) between two decisions of a strategy with this period."""
+    return steps_of_period(period_s, rules.control.step_s) * rules.control.step_s
 
 
 def is_metered(strategy: Decider) -> bool:

@@ -16,12 +16,12 @@ RAMP, LANE, MAINLINE = range(3)
 
 
 class Platoon(NamedTuple):
-    """All live vehicles, front first, one entry each.
+    """All live vehicles in the order of merging, front first, one entry each.
 
     ``virtual_m`` is where a vehicle counts on the mainline: where one that cruises at v0 would have
-    to be now to be beside it once it has merged. For mainline vehicles that is their station.
-    ``virtual_mps`` is the speed of that place. ``same_lane`` is the entry of the next vehicle
-    ahead on the same road, -1 for none.
+    to be now to be beside it once it has merged, but not before the tail of who is ahead of it on
+    the ramp. For mainline vehicles that is their station. ``virtual_mps`` is the speed of that
+    place. ``same_road`` is the entry of the next vehicle ahead on the same road, -1 for none.
     """
 
     rows: IntArray
@@ -31,40 +31,79 @@ class Platoon(NamedTuple):
     length_m: FloatArray
     virtual_m: FloatArray
     virtual_mps: FloatArray
-    same_lane: IntArray
+    same_road: IntArray
+
+
+STATION, SPEED, LENGTH, VIRTUAL, VIRTUAL_SPEED = range(5)
+"""Columns of ``_road_users``."""
 
 
 @kernel
 def virtual_platoon(fleet: Fleet, at_s: float, packed_rules: FloatArray) -> Platoon:
     """Returns where everyone will be at ``at_s`` by his commitment, mapped onto the mainline."""
     rules = unpacked(packed_rules)
-    count = len(fleet.live)
+    lane_rows, lane_stage, lane = _road_users(fleet, at_s, True, rules)
+    ramp_rows, ramp_stage, ramp = _road_users(fleet, at_s, False, rules)
+    _keep_ramp_order(ramp)
+    count = len(lane_rows) + len(ramp_rows)
     rows, stage = np.empty(count, np.int64), np.empty(count, np.int64)
-    numbers = np.empty((5, count))
-    for i in range(count):
-        row = fleet.live[i]
-        station_m, speed_mps = station_and_speed(committed(fleet, row), at_s)
-        own_stage, at_m, at_mps = MAINLINE, station_m, speed_mps
-        if fleet.merge_time_s[row] > at_s:
-            own_stage = RAMP if station_m < 0.0 else LANE
-            at_m, at_mps = place_on_mainline(station_m, speed_mps, rules)
-        k = i
-        while k > 0 and numbers[3, k - 1] < at_m:
-            rows[k], stage[k], numbers[:, k] = rows[k - 1], stage[k - 1], numbers[:, k - 1]
-            k -= 1
-        rows[k], stage[k] = row, own_stage
-        numbers[0, k], numbers[1, k], numbers[2, k] = station_m, speed_mps, fleet.length_m[row]
-        numbers[3, k], numbers[4, k] = at_m, at_mps
+    same_road, numbers = np.empty(count, np.int64), np.empty((count, 5))
+    i, j, last_lane, last_ramp = 0, 0, -1, -1
+    for k in range(count):
+        if j == len(ramp_rows) or (i < len(lane_rows) and lane[i, VIRTUAL] >= ramp[j, VIRTUAL]):
+            rows[k], stage[k], numbers[k] = lane_rows[i], lane_stage[i], lane[i]
+            same_road[k], last_lane, i = last_lane, k, i + 1
+        else:
+            rows[k], stage[k], numbers[k] = ramp_rows[j], ramp_stage[j], ramp[j]
+            same_road[k], last_ramp, j = last_ramp, k, j + 1
     return Platoon(
         rows,
         stage,
-        numbers[0],
-        numbers[1],
-        numbers[2],
-        numbers[3],
-        numbers[4],
-        _next_on_same_road(stage),
+        numbers[:, STATION].copy(),
+        numbers[:, SPEED].copy(),
+        numbers[:, LENGTH].copy(),
+        numbers[:, VIRTUAL].copy(),
+        numbers[:, VIRTUAL_SPEED].copy(),
+        same_road,
     )
+
+
+@kernel
+def _road_users(
+    fleet: Fleet, at_s: float, merged: bool, rules: Rules
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Returns rows, stages and numbers of who is on the mainline, or on ramp and lane, in order."""
+    rows, stage = np.empty(len(fleet.live), np.int64), np.empty(len(fleet.live), np.int64)
+    numbers = np.empty((len(fleet.live), 5))
+    n = 0
+    for row in fleet.live:
+        if (fleet.merge_time_s[row] <= at_s) != merged:
+            continue
+        station_m, speed_mps = station_and_speed(committed(fleet, row), at_s)
+        k = n
+        while k > 0 and numbers[k - 1, STATION] < station_m:
+            rows[k], stage[k], numbers[k] = rows[k - 1], stage[k - 1], numbers[k - 1]
+            k -= 1
+        rows[k], stage[k] = row, MAINLINE
+        virtual_m, virtual_mps = station_m, speed_mps
+        if not merged:
+            stage[k] = RAMP if station_m < 0.0 else LANE
+            virtual_m, virtual_mps = place_on_mainline(station_m, speed_mps, rules)
+        numbers[k, STATION], numbers[k, SPEED] = station_m, speed_mps
+        numbers[k, LENGTH] = fleet.length_m[row]
+        numbers[k, VIRTUAL], numbers[k, VIRTUAL_SPEED] = virtual_m, virtual_mps
+        n += 1
+    return rows[:n], stage[:n], numbers[:n]
+
+
+@kernel
+def _keep_ramp_order(ramp: FloatArray) -> None:
+    """Has nobody count before the tail of who is ahead, however slow that one is."""
+    for k in range(1, len(ramp)):
+        tail_m = ramp[k - 1, VIRTUAL] - ramp[k - 1, LENGTH]
+        if ramp[k, VIRTUAL] > tail_m:
+            ramp[k, VIRTUAL] = tail_m
+            ramp[k, VIRTUAL_SPEED] = min(ramp[k, VIRTUAL_SPEED], ramp[k - 1, VIRTUAL_SPEED])
 
 
 @kernel
@@ -84,14 +123,3 @@ def place_on_mainline(station_m: float, speed_mps: float, rules: Rules) -> tuple
     to_nose_s = (nose_mps - now_mps) / up + (-station_m - gaining_m) / ramp_mps
     virtual_m = -v0 * to_nose_s - lag_m(v0, nose_mps, motion.free_acceleration_mps2)
     return virtual_m, speed_mps * v0 / ramp_mps
-
-
-@kernel
-def _next_on_same_road(stage: IntArray) -> IntArray:
-    ahead = np.full(len(stage), -1)
-    last_on = np.full(2, -1)
-    for k in range(len(stage)):
-        road = 1 if stage[k] == MAINLINE else 0
-        ahead[k] = last_on[road]
-        last_on[road] = k
-    return ahead

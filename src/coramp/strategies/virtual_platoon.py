@@ -10,9 +10,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from coramp._kernel import FloatArray
+from coramp._kernel import FloatArray, IntArray
 from coramp.core.rules import Rules
-from coramp.strategies.base import Decision, DriveWithAcceleration, Memory, View
+from coramp.strategies.base import (
+    Decision,
+    DriveWithAcceleration,
+    Memory,
+    View,
+    held_period_s,
+)
 from coramp.strategies.feedback import LANE, RAMP, Platoon, virtual_platoon
 from coramp.strategies.parameters import parameter
 
@@ -23,7 +29,9 @@ class VirtualPlatoon:
 
     ``u = k_p (s - t_c v - s_0) + k_v (v_p - v)``, no more than what brings it to its lane's speed,
     ``u = k_v (v_d - v)``, and saturated. s is the bumper distance to the predecessor and v_p its
-    speed, where ramp vehicles count at their places on the mainline (``feedback.Platoon``).
+    speed. To a predecessor on the other road ramp vehicles count at their places on the mainline
+    (``feedback.Platoon``), and u is scaled back from there. Who is ahead on the same road is
+    followed as well, as it is.
     """
 
     name: ClassVar[str] = "virtual-platoon"
@@ -43,20 +51,33 @@ class VirtualPlatoon:
         at_s = view.time_s + view.rules.control.actuation_delay_s
         platoon = virtual_platoon(view.fleet, at_s, view.packed_rules)
         accel_mps2 = self.accelerations_mps2(platoon, view.rules)
-        return Decision(drive_commands(platoon, accel_mps2, self.period_s), (), memory)
+        hold_s = held_period_s(self.period_s, view.rules)
+        return Decision(drive_commands(platoon, accel_mps2, hold_s), (), memory)
 
     def accelerations_mps2(self, platoon: Platoon, rules: Rules) -> FloatArray:
         """Returns the law's accelerations (m/s2), front first."""
-        on_ramp = platoon.stage == RAMP
         v0, ramp_mps = rules.road.mainline_speed_mps, rules.road.ramp_speed_mps
-        free = self.speed_gain_ps * (v0 - platoon.virtual_mps)
-        gap_m = platoon.virtual_m[:-1] - platoon.length_m[:-1] - platoon.virtual_m[1:]
-        own_mps, ahead_mps = platoon.virtual_mps[1:], platoon.virtual_mps[:-1]
-        follow = self.gap_gain_ps2 * (gap_m - self.time_gap_s * own_mps - self.standstill_gap_m)
-        follow += self.speed_gain_ps * (ahead_mps - own_mps)
-        free[1:] = np.minimum(free[1:], follow)
-        scaled = np.where(on_ramp, free * ramp_mps / v0, free)
-        return saturated(scaled, rules)
+        on_ramp = platoon.stage == RAMP
+        wish_mps = np.where(on_ramp, ramp_mps, v0)
+        accel_mps2 = self.speed_gain_ps * (wish_mps - platoon.speed_mps)
+        road = self._following(
+            platoon.station_m, platoon.speed_mps, platoon.length_m, platoon.same_road
+        )
+        order = np.arange(len(on_ramp)) - 1
+        across = np.where(platoon.same_road == order, -1, order)
+        merging = self._following(
+            platoon.virtual_m, platoon.virtual_mps, platoon.length_m, across
+        ) * np.where(on_ramp, ramp_mps / v0, 1.0)
+        return saturated(np.minimum(accel_mps2, np.minimum(road, merging)), rules)
+
+    def _following(
+        self, place_m: FloatArray, speed_mps: FloatArray, length_m: FloatArray, ahead: IntArray
+    ) -> FloatArray:
+        """The law to the entry ahead of each; infinite for those that have none."""
+        gap_m = place_m[ahead] - length_m[ahead] - place_m
+        error_m = gap_m - self.time_gap_s * speed_mps - self.standstill_gap_m
+        law = self.gap_gain_ps2 * error_m + self.speed_gain_ps * (speed_mps[ahead] - speed_mps)
+        return np.where(ahead >= 0, law, np.inf)
 
 
 def saturated(accel_mps2: FloatArray, rules: Rules) -> FloatArray:
