@@ -37,7 +37,8 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
 
     Raises CorampError where the strategy plans nothing, or the situation is lost already.
     """
-    chosen = strategy_to_run(strategy)
+    scenario = snapshot.road()
+    chosen = strategy_to_run(strategy, scenario.strategy.get(strategy))
     if period_of(chosen) is not None:
         raise CorampError(
             f"strategy: {strategy} steers step by step and plans nothing ahead; "
@@ -45,7 +46,6 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         )
     if not strategy_named(strategy).cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
-    scenario = snapshot.road()
     vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))
     arrivals = [
         Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.vehicle.length_m)

@@ -15,7 +15,7 @@ from coramp.core.ramp_acceleration import lag_m
 from coramp.core.rules import Control, MotionLimits, Road, Rules, SafetyBudget
 from coramp.core.safe_distance import braking_distance_m, merge_clearance_m
 from coramp.errors import CorampError
-from coramp.strategies.parameters import Value, wrong_settings
+from coramp.strategies.parameters import Value, wrong_settings, wrong_together
 from coramp.strategies.registry import strategy_named
 
 FASTEST_MPS = 60.0
@@ -375,7 +375,8 @@ def _strategy_problems(scenario: Scenario) -> list[str]:
         except CorampError as error:
             problems += error.messages
             continue
-        problems += [f"strategy.{name}.{line}" for line in wrong_settings(found, settings)]
+        wrong = wrong_settings(found, settings) or wrong_together(found, settings)
+        problems += [f"strategy.{name}.{line}" for line in wrong]
     return problems
 
 

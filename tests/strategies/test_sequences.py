@@ -1,5 +1,6 @@
 """Orders of merging: dynamic programming against all orders, the program against both, the game."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -66,6 +67,29 @@ def test_dynamic_programming_equals_brute_force(seen, weight, least):
     places = [k for k, ramp in enumerate(best.ramp) if ramp]
     times, delay = crossed(seen, places, *least)
     assert (times[-1], delay) == (pytest.approx(best.last_s), pytest.approx(best.delay_s))
+
+
+@settings(max_examples=100)
+@given(queues(7), st.floats(0.0, 12.0), st.sampled_from([(0.0, 0.0), (1.5, 2.0), (0.0, 8.0)]))
+def test_who_surely_goes_first_changes_nothing_for_the_others(seen, later_s, least):
+    """Lane vehicles long before the ramp's first are left out; the best order is that of all."""
+    lane_s = np.sort(np.concatenate([seen.mainline_s[:1] - later_s, seen.mainline_s[1:]]))
+    seen = replace(seen, mainline_s=lane_s)
+    strategy = DpSequence(*least, 0.0)
+    before = strategy.vehicles_before(seen)
+    costs = [
+        crossed(seen, places, *least)[1]
+        for places in combinations(range(len(lane_s) + len(seen.ramp_s)), len(seen.ramp_s))
+        if places[0] == before
+    ]
+    assert min(costs) == pytest.approx(least_cost(seen, 0.0, *least))
+
+
+def test_a_lane_vehicle_of_long_ago_still_binds_where_gaps_are_long():
+    # by hand: L1, L2, S: S crosses at 8.5 s; L1, S, L2: at 1.5 s, and L2 at 9.5 s, 10.5 s in all
+    seen = Crossings(*map(np.array, ([-6.5, 0.5], [0.0], [0.26, 0.26], [0.26])))
+    assert DpSequence(0.0, 8.0, 0.0).vehicles_before(seen) == 2
+    assert MilpSequence(0.0, 8.0).vehicles_before(seen) == 2
 
 
 @settings(max_examples=40, deadline=None)

@@ -68,6 +68,8 @@ class Refusal:
 
 PERIOD = -1
 """Stands for a vehicle's row where the strategy is woken by its own clock."""
+ASKED, DUE = range(2)
+"""Kinds of wakes: the strategy asked for it, or the vehicle reaches its decision station."""
 
 
 class Coordinator:
@@ -101,7 +103,7 @@ class Coordinator:
         self._memory: Memory = None
         self._step_s = rules.control.step_s
         self._due_step: dict[int, int] = {}
-        self._wakes: list[tuple[int, int]] = []
+        self._wakes: list[tuple[int, int, int]] = []
         self._announced = 0
         period_s = period_of(strategy)
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
@@ -147,7 +149,7 @@ class Coordinator:
         for row, due in enumerate(self._gate.row_due_step[new].tolist(), new.start):
             if due != NEVER:
                 self._due_step[row] = due
-                self._wake(due, row)
+                self._wake(due, row, DUE)
                 first_due = min(first_due, due)
         return first_due
 
@@ -178,8 +180,8 @@ class Coordinator:
         return sorted(set(range(len(self._arrivals))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
-        if self._wakes[0] == (step, PERIOD):
-            heapq.heapreplace(self._wakes, (step + self._period_steps, PERIOD))
+        if self._wakes[0][:2] == (step, PERIOD):
+            heapq.heapreplace(self._wakes, (step + self._period_steps, PERIOD, ASKED))
             if len(self.ledger.fleet.live):
                 self._decide((), step)
         while subjects := self._woken(step):
@@ -190,14 +192,16 @@ class Coordinator:
     def _woken(self, step: int) -> tuple[int, ...]:
         rows: dict[int, None] = {}
         while self._wakes and self._wakes[0][0] == step:
-            _, row = heapq.heappop(self._wakes)
-            if self._due_step.get(row, step) == step:
-                self._due_step.pop(row, None)
+            _, row, kind = heapq.heappop(self._wakes)
+            if kind == ASKED:
+                rows[row] = None
+            elif self._due_step.get(row) == step:  # else its way has changed since
+                del self._due_step[row]
                 rows[row] = None
         return tuple(rows)
 
-    def _wake(self, step: int, row: int) -> None:
-        heapq.heappush(self._wakes, (step, row))
+    def _wake(self, step: int, row: int, kind: int = ASKED) -> None:
+        heapq.heappush(self._wakes, (step, row, kind))
 
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts an arrival on the road, harmonised from there; False where that is not safe."""
@@ -226,7 +230,7 @@ class Coordinator:
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
         due_s = decision_due_s(pieces, self._rules.road.decision_station_m)
         self._due_step[row] = max(step, first_step_from(due_s, self._step_s))
-        self._wake(self._due_step[row], row)
+        self._wake(self._due_step[row], row, DUE)
 
     def _goes_on_to_station(self, row: int, step: int) -> bool:
         """Whether a vehicle whose stop lay before its decision station can now go on towards it."""

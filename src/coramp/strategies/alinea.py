@@ -54,6 +54,13 @@ class Alinea:
     )
     period_s: float = parameter(1.0, 0.1, 2.0, meaning="clock of the signal")
 
+    def problems(self) -> list[str]:
+        """Returns what does not fit together: a range of rates that is none."""
+        if self.least_veh_h < self.most_veh_h:
+            return []
+        most = f"most_veh_h, {self.most_veh_h:g}"
+        return [f"least_veh_h: {self.least_veh_h:g} meters nothing; allowed is below {most}"]
+
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the release of subjects, or, once a period, the signal where it changes."""
         if view.subjects or view.detectors is None:

@@ -4,15 +4,13 @@ Source: H. Pei, S. Feng, Y. Zhang, D. Yao, "A cooperative driving strategy for m
 based on dynamic programming", IEEE Trans. Veh. Technol. 68(12):11646-11656, 2019.
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.parameters import parameter
 from coramp.strategies.sequence import Crossings, decide_in_sequence
-
-LOOK_BACK_S = 6.0
-"""Lane vehicles that cross so long before the subject could are taken to go first."""
 
 
 class Label(NamedTuple):
@@ -46,8 +44,23 @@ class DpSequence:
 
     def vehicles_before(self, seen: Crossings) -> int:
         """Returns how many lane vehicles cross before the subject in the best order."""
-        first = int((seen.mainline_s < seen.ramp_s[0] - LOOK_BACK_S).sum())
+        first = self.surely_first(seen)
         return first + self.best(behind(seen, first)).ramp.index(True)
+
+    def surely_first(self, seen: Crossings) -> int:
+        """Returns how many lane vehicles have crossed, in their order, before anyone else can.
+
+        They keep nobody waiting by going first, so that the rest can be put in order by itself.
+        """
+        crosses_s, needs_s, first = -math.inf, 0.0, 0
+        earliest_s = [*seen.mainline_s.tolist(), math.inf]
+        for k in range(len(seen.mainline_s)):
+            crosses_s = max(earliest_s[k], crosses_s + max(needs_s, self.same_stream_s))
+            needs_s = float(seen.mainline_next_s[k])
+            free_s = crosses_s + max(needs_s, self.same_stream_s, self.cross_stream_s)
+            if free_s <= min(earliest_s[k + 1], float(seen.ramp_s[0])):
+                first = k + 1
+        return first
 
     def best(self, seen: Crossings) -> Label:
         """Returns the best order of all, by states of how many of each stream have crossed."""

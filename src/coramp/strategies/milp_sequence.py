@@ -29,8 +29,8 @@ class MilpSequence:
     With h_ij what j must leave after i, and y_ij = 1 if i crosses first:
     ``t_j - t_i >= h_ij - M (1 - y_ij)``, ``t_i - t_j >= h_ji - M y_ij`` for a lane vehicle i and a
     ramp vehicle j; within a stream the order is kept. The horizon holds the subject, the ramp
-    vehicles behind it that come within ``horizon_s``, and the lane vehicles that cross from
-    ``horizon_s`` before the subject to ``horizon_s`` after the last of them.
+    vehicles behind it that come within ``horizon_s``, or h if that is longer, and the lane vehicles
+    that cross from so long before the subject to so long after the last of them.
     """
 
     name: ClassVar[str] = "milp-sequence"
@@ -54,10 +54,11 @@ class MilpSequence:
 
     def within_horizon(self, seen: Crossings) -> tuple[int, Crossings]:
         """Returns how many lane vehicles go before the horizon, and who is in it."""
-        near = seen.ramp_s <= seen.ramp_s[0] + self.horizon_s
+        reach_s = max(self.horizon_s, self.same_stream_s, self.cross_stream_s)
+        near = seen.ramp_s <= seen.ramp_s[0] + reach_s
         ramps = min(int(near.sum()), self.ramp_vehicles)
-        first = int((seen.mainline_s < seen.ramp_s[0] - self.horizon_s).sum())
-        last = int((seen.mainline_s <= seen.ramp_s[ramps - 1] + self.horizon_s).sum())
+        first = int((seen.mainline_s < seen.ramp_s[0] - reach_s).sum())
+        last = int((seen.mainline_s <= seen.ramp_s[ramps - 1] + reach_s).sum())
         return first, Crossings(
             seen.mainline_s[first:last],
             seen.ramp_s[:ramps],

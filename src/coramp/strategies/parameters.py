@@ -48,6 +48,19 @@ def wrong_settings(strategy: type, settings: Mapping[str, Any]) -> list[str]:
     return [line for key, value in settings.items() if (line := _wrong(known, key, value))]
 
 
+def wrong_together(strategy: type, settings: Mapping[str, Any]) -> list[str]:
+    """Returns a line for each setting that does not fit the others, as the strategy tells.
+
+    What a strategy raises here is told when it is to run.
+    """
+    if not hasattr(strategy, "problems"):
+        return []
+    try:
+        return [str(line) for line in strategy(**settings).problems()]
+    except Exception:  # noqa: BLE001 - it may raise anything
+        return []
+
+
 def _settable(strategy: type) -> list[Field[Any]]:
     if not is_dataclass(strategy):
         return []
