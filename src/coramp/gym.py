@@ -15,6 +15,7 @@ from coramp._kernel import FloatArray, IntArray, kernel
 from coramp._registration import register
 from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.guard import LONGEST_PERIOD_S, strategy_to_run
 from coramp.core.fleet import Fleet
 from coramp.core.ramp_acceleration import lag_m
 from coramp.core.rules import Rules, packed, unpacked
@@ -28,6 +29,7 @@ from coramp.strategies.base import (
     Memory,
     View,
     period_of,
+    steps_of_period,
 )
 from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
 from coramp.strategies.registry import strategy_named
@@ -39,6 +41,8 @@ STATION_FEATURE = 1
 FARTHEST_M = 400.0
 """Who is further away, or not there at all, counts as this far away, at the lane's speed."""
 WARM_UP_S = 30.0
+MOST_DRAWS = 1000
+"""So often traffic is drawn anew for an episode before there is taken to be no agent at all."""
 ACTION_WEIGHT = 0.02
 INTERVENTION_COST = 1.0
 
@@ -97,13 +101,14 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     **Reward** of a step, summed over agents: the time lost (s, as a negative number) against v_R0,
     in the last step also what its committed merge will lose from there to the zone's end against
     free movement; less ``0.02 u^2 period_s``; less 1 for a command that the supervisor refused. So
-    an episode's sum is the agent's delay, its effort and its refusals, all negative.
+    an episode's sum is, below 0, the agents' delay from where they became agents, their effort and
+    their refusals; who waits outside, or behind the foremost ``slots``, is no agent yet.
 
     **End.** Terminated once the agent (all ramp vehicles) is past the nose, from where it drives as
     committed; truncated after ``longest_s`` (600). A merge once committed is only replaced by
     another that is safe. ``loop`` is the coordinator underneath; ``info`` has ``time_s``,
-    ``interventions`` and ``rows``, the agents' rows in the ledger. The same seed gives the same
-    traffic.
+    ``interventions``, how many commands of agents were refused so far, and ``rows``, the agents'
+    rows in the ledger. The same seed gives the same traffic.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
@@ -122,21 +127,14 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         longest_s: float = 600.0,
     ) -> None:
         """Raises CorampError for a scenario, strategy or number that cannot be."""
-        if agents not in ("one", "all"):
-            raise CorampError(f"agents: {agents!r} cannot be; allowed are one, all")
-        if horizon_s <= WARM_UP_S:
-            raise CorampError(
-                f"horizon_s: {horizon_s:g} cannot be; allowed is above {WARM_UP_S:g} s"
-            )
-        if slots < 1:
-            raise CorampError(f"slots: {slots} cannot be; allowed is at least 1")
+        _check(agents, horizon_s, slots, period_s, longest_s)
         flows = {"mainline.flow_veh_h": mainline_veh_h, "ramp.flow_veh_h": ramp_veh_h}
         self._scenario = load_scenario(
             scenario, {**{k: float(v) for k, v in flows.items()}, "simulation.horizon_s": horizon_s}
         )
-        self._rules = self._scenario.rules()
+        self._rules, self._horizon_s = self._scenario.rules(), horizon_s
         self._step_s = self._rules.control.step_s
-        self._period = max(1, round(period_s / self._step_s))
+        self._period = steps_of_period(period_s, self._step_s)
         self._hold_s = self._period * self._step_s
         self._longest = round(longest_s / self._step_s)
         self._packed = packed(self._rules)
@@ -144,8 +142,8 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._lag_m = lag_m(road.mainline_speed_mps, road.ramp_speed_mps, accel_mps2)
         self._everyone = agents == "all"
         self._slots = slots if self._everyone else 1
-        self._others = strategy_named(others)
-        if not self._others.cooperative or period_of(self._others()) is not None:
+        self._others = others
+        if not strategy_named(others).cooperative or period_of(self._new_others()) is not None:
             raise CorampError(f"others: {others} does not plan; choose a planning strategy")
         self._actions = spaces.Box(-1.0, 1.0, (self._slots,), np.float64)
         shape = (self._slots, FEATURES) if self._everyone else (FEATURES,)
@@ -158,10 +156,14 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Returns the first observation: an agent has just entered the ramp."""
         super().reset(seed=seed, options=options)
-        while True:
+        for _ in range(MOST_DRAWS):
             traffic = int(self.np_random.integers(2**31 - 1))
             if self._begin(traffic):
                 return self._observation(), self._info()
+        raise CorampError(
+            f"ramp_veh_h: no ramp vehicle came in {MOST_DRAWS} draws of {self._horizon_s:g} s; "
+            "allowed are flows and horizons with somebody on the ramp"
+        )
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Drives for a period; see the class for what it returns."""
@@ -171,30 +173,29 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
             raise CorampError("action: holds a number that is not finite")
         motion = self._rules.motion
         accel_mps2 = share * np.where(share < 0.0, motion.comfort_mps2, motion.speed_up_mps2)
-        refused = loop.interventions
-        if rows:
-            pairs = zip(rows, accel_mps2.tolist(), strict=False)
-            commands = tuple(DriveWithAcceleration(row, u, self._hold_s) for row, u in pairs)
-            loop.carry_out(Decision(commands), (), self._now)
+        pairs = zip(rows, accel_mps2.tolist(), strict=False)
+        commands = [DriveWithAcceleration(row, u, self._hold_s) for row, u in pairs]
+        refused = loop.drive(commands, self._now) if commands else 0
+        self._interventions += refused
         before_m = self._seen.features[: len(rows), STATION_FEATURE]
         self._now += self._period
         loop.run(self._now)
         self._seen = self._look()
-        reward = self._reward(rows, before_m, accel_mps2)
-        reward -= INTERVENTION_COST * (loop.interventions - refused)
+        reward = self._reward(rows, before_m, accel_mps2) - INTERVENTION_COST * refused
         over = self._now - self._started >= self._longest
         return self._observation(), reward, self._ended(), over, self._info()
 
     def _begin(self, traffic: int) -> bool:
         """Draws new traffic and lets it run until there is an agent; False where none comes."""
-        self._arrivals = arrivals_of(self._scenario, traffic)
-        self._strategy = _Others(self._others(), self._everyone)
+        self.arrivals = arrivals_of(self._scenario, traffic)
+        self._interventions = 0
+        self._strategy = _Others(self._new_others(), self._everyone)
         self.loop = Coordinator(
-            self._strategy, self._rules, self._arrivals, self._scenario.fastest_mainline_entry_mps
+            self._strategy, self._rules, self.arrivals, self._scenario.fastest_mainline_entry_mps
         )
         self.loop.expect_arrivals()
         first = 0 if self._everyone else round(WARM_UP_S / self._step_s)
-        steps = [a.step for a in self._arrivals if a.on_ramp and a.step >= first]
+        steps = [a.step for a in self.arrivals if a.on_ramp and a.step >= first]
         if not steps:
             return False
         self._now = steps[0] - 1
@@ -207,6 +208,9 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
             self._strategy.agent = self._first_on_ramp(entered)
         self._started, self._seen = self._now, self._look()
         return True
+
+    def _new_others(self) -> Decider:
+        return strategy_to_run(self._others, self._scenario.strategy.get(self._others))
 
     def _first_on_ramp(self, first: int) -> int:
         """Returns the first row from that one on without a committed merge, -1 for none."""
@@ -226,14 +230,14 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def _reward(self, rows: list[int], before_m: FloatArray, accel_mps2: FloatArray) -> float:
         road, ledger, reward = self._rules.road, self.loop.ledger, 0.0
-        now_s, still = self._now * self._step_s, set(self._seen.rows.tolist())
+        now_s = self._now * self._step_s
         for row, was_m, accel in zip(rows, before_m.tolist(), accel_mps2.tolist(), strict=False):
             is_m, _ = station_and_speed(ledger.trajectory(row), now_s)
             on_ramp_m = min(0.0, is_m) - min(0.0, was_m)
             wished_s = on_ramp_m / road.ramp_speed_mps
             wished_s += (is_m - was_m - on_ramp_m) / road.mainline_speed_mps
             reward += wished_s - self._hold_s - ACTION_WEIGHT * accel * accel * self._hold_s
-            if row not in still:
+            if is_m >= 0.0:
                 way_m = road.mainline_end_m + self._lag_m - max(0.0, is_m)
                 to_come_s = ledger.exit_time_s(row) - now_s
                 reward += way_m / road.mainline_speed_mps - to_come_s
@@ -243,14 +247,33 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         if len(self._seen.rows):
             return False
         left = self.loop.waiting() if self._everyone else []
-        return not any(self._arrivals[number].on_ramp for number in left)
+        return not any(self.arrivals[number].on_ramp for number in left)
 
     def _info(self) -> dict[str, Any]:
         return {
             "time_s": self._now * self._step_s,
-            "interventions": self.loop.interventions,
+            "interventions": self._interventions,
             "rows": self._seen.rows.tolist(),
         }
+
+
+def _check(agents: str, horizon_s: float, slots: int, period_s: float, longest_s: float) -> None:
+    """Raises CorampError with a line for each setting that cannot be."""
+    wrong = {
+        f"agents: {agents!r} cannot be; allowed are one, all": agents not in ("one", "all"),
+        f"horizon_s: {horizon_s:g} cannot be; allowed is above {WARM_UP_S:g} s": not (
+            WARM_UP_S < horizon_s < math.inf
+        ),
+        f"slots: {slots} cannot be; allowed is at least 1": slots < 1,
+        f"period_s: {period_s:g} cannot be; allowed is above 0, up to {LONGEST_PERIOD_S:g}": not (
+            0.0 < period_s <= LONGEST_PERIOD_S
+        ),
+        f"longest_s: {longest_s:g} cannot be; allowed is period_s, {period_s:g}, and more": not (
+            0.0 < longest_s < math.inf and not longest_s < period_s
+        ),
+    }
+    if told := [line for line, is_wrong in wrong.items() if is_wrong]:
+        raise CorampError(*told)
 
 
 def _bounds(rules: Rules, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:

@@ -8,56 +8,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coramp.arrivals import arrivals_of
-from coramp.coordination.driven import MAINLINE
 from coramp.coordination.plant import Arrival
 from coramp.loading import load_scenario
 from coramp.strategies.base import Decision, FollowTrajectory
 from coramp.strategies.situation import assess
-from tests.situations import STEP_S, driven, loop, named, situations
-
-SAMPLE_S = 0.05
-
-
-def states(vehicle, times_s):
-    """Station, speed and lane by plain evaluation of the pieces; nan where it is not there."""
-    starts = vehicle.pieces[:, 0]
-    k = np.clip(np.searchsorted(starts, times_s, side="right") - 1, 0, None)
-    x = times_s - starts[k]
-    station = vehicle.pieces[k, 1] + vehicle.pieces[k, 2] * x + vehicle.pieces[k, 3] * x * x / 2
-    speed = vehicle.pieces[k, 2] + vehicle.pieces[k, 3] * x
-    there = (times_s >= starts[0]) & (times_s < vehicle.until_s)
-    return np.where(there, station, np.nan), speed, vehicle.lanes[k] == MAINLINE
+from tests.situations import (
+    COOPERATIVE,
+    STEP_S,
+    driven,
+    least_margin_m,
+    loop,
+    named,
+    situations,
+    states,
+)
 
 
-def eq_1(front_mps, rear_mps, safety):
-    closing = 3.6 * np.maximum(0.0, rear_mps - front_mps)
-    return (
-        2 * safety.positioning_error_m
-        + safety.clock_error_s * (front_mps + rear_mps)
-        + closing**2 / (254 * (safety.adhesion + safety.resistance))
-        + safety.time_gap_s * rear_mps
-    )
-
-
+@pytest.mark.parametrize("strategy", COOPERATIVE)
+@settings(max_examples=25)
 @given(situations())
-def test_no_two_in_a_lane_come_nearer_than_promised(situation):
-    scenario, arrivals, strategy = situation
+def test_no_two_in_a_lane_come_nearer_than_promised(strategy, situation):
+    scenario, arrivals, _ = situation
     coordinator = loop(scenario, arrivals, strategy)
-    vehicles = driven(coordinator, arrivals)
-    times_s = np.arange(0.0, max(v.pieces[-1, 0] for v in vehicles) + 10.0, SAMPLE_S)
-    sampled = [states(v, times_s) for v in vehicles]
-    station = np.array([s[0] for s in sampled])
-    speed = np.array([s[1] for s in sampled])
-    on_mainline = np.array([s[2] for s in sampled])
-    length = np.array([v.length_m for v in vehicles])
-    safety = scenario.safety
-    for i in range(len(vehicles)):
-        shared = on_mainline == on_mainline[i]
-        gap = station[i] - length[i] - station
-        behind = shared & (station <= station[i])
-        behind[i] = False
-        margin = gap - eq_1(speed[i], speed, safety)
-        assert np.all(margin[behind] >= safety.execution_allowance_m - 1e-6)
+    least_m = least_margin_m(driven(coordinator, arrivals), scenario.safety)
+    assert least_m >= scenario.safety.execution_allowance_m - 1e-6
 
 
 @given(situations())
@@ -140,10 +114,11 @@ def before(coordinator, time_s, delay_s):
     return entered, decided, committed
 
 
-@settings(max_examples=100)
+@pytest.mark.parametrize("strategy", COOPERATIVE)
+@settings(max_examples=25)
 @given(situations(), st.integers(30, 400), st.randoms(use_true_random=False), st.data())
-def test_what_arrives_later_changes_no_decision_before(situation, step, random, data):
-    scenario, arrivals, strategy = situation
+def test_what_arrives_later_changes_no_decision_before(strategy, situation, step, random, data):
+    scenario, arrivals, _ = situation
     early = [a for a in arrivals if a.step < step]
     late = [a for a in arrivals if a.step >= step]
     change = data.draw(st.sampled_from(["insert", "remove", "retime", "all at once"]))

@@ -1,16 +1,20 @@
 """Commands by acceleration: carried out, replaced and counted."""
 
 import math
+from random import Random
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.driven import RAMP
 from coramp.coordination.plant import Arrival
 from coramp.core.trajectory import station_and_speed
 from coramp.loading import load_scenario
 from coramp.strategies.base import Decision, DriveWithAcceleration
-from tests.situations import named
+from tests.situations import driven, least_margin_m, loop, named, situations
 
 RULES = load_scenario("paper").rules()
 NOW_S = 5.0
@@ -107,6 +111,46 @@ def test_the_second_on_the_ramp_stops_behind_the_first():
     assert commanded(loop, (0, 0.0, 0.5, False), (1, 0.0, 0.5, False)) == 0
     first, second = (loop.ledger.trajectory(row)[-1, 1] for row in (0, 1))
     assert second < first - 5.0
+
+
+class Wild:
+    """Commands everyone anything, from full braking to full power, for any time, merges or not."""
+
+    period_s = 0.5
+
+    def __init__(self, random):
+        self._random = random
+
+    def decide(self, view, memory):
+        if view.subjects:
+            return Decision()
+        chosen = [row for row in view.fleet.live.tolist() if self._random.random() < 0.8]
+        return Decision(
+            tuple(
+                DriveWithAcceleration(
+                    row,
+                    self._random.choice([-3.5, -2.94, -1.0, 0.0, 0.7, 1.5, 5.0]),
+                    self._random.choice([0.1, 0.5, 0.73, 3.0]),
+                    self._random.random() < 0.7,
+                )
+                for row in chosen
+            )
+        )
+
+
+@settings(max_examples=60)
+@given(situations(), st.integers(0, 2**32))
+def test_whatever_is_commanded_everyone_keeps_its_distance(situation, seed):
+    scenario, arrivals, _ = situation
+    coordinator = loop(scenario, arrivals, Wild(Random(seed)), last_s=120.0)
+    vehicles = driven(coordinator, arrivals, 120.0)
+    least_m = least_margin_m(vehicles, scenario.safety)
+    assert least_m >= scenario.safety.execution_allowance_m - 1e-6
+    for vehicle in vehicles:
+        assert vehicle.pieces[:, 2].min() >= -1e-9
+        assert vehicle.pieces[:, 3].min() >= -scenario.rules().motion.comfort_mps2 - 1e-9
+        ramp_m = vehicle.pieces[vehicle.lanes == RAMP, 1]
+        assert ramp_m.max(initial=-1.0) <= 1e-6
 
 
 def test_many_commands_make_the_book_grow():

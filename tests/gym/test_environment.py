@@ -1,6 +1,8 @@
 """coramp/Merge-v0: Gymnasium's own checker, seeds, rewards, and safety whatever agents do."""
 
+import dataclasses
 import math
+from typing import ClassVar
 
 import gymnasium
 import numpy as np
@@ -9,6 +11,9 @@ from gymnasium.utils.env_checker import check_env
 
 import coramp.gym
 from coramp.errors import CorampError
+from coramp.loading import load_scenario
+from coramp.strategies.mainline_priority import MainlinePriority
+from tests import situations
 
 BUSY = {"mainline_veh_h": 2400.0, "ramp_veh_h": 900.0}
 
@@ -62,11 +67,42 @@ def test_whatever_agents_do_everyone_keeps_its_distance(agents, action):
     env = made(agents=agents, **BUSY)
     shape = env.action_space.shape
     policy = at_random(shape) if action is None else lambda *_: np.full(shape, action)
-    driven(env, 11, policy, 300)
+    seen = driven(env, 11, policy, 300)
+    assert all(math.isfinite(step[1]) for step in seen[1:])
     assert env.loop.refusals == []
-    book, live = env.loop.ledger.book, env.loop.ledger.fleet.live
-    merges = [book.merge_time_s[row] for row in live]
-    assert all(not math.isnan(merge) for merge in merges)
+    end_s = seen[-1][-1]["time_s"]
+    vehicles = situations.driven(env.loop, env.arrivals, end_s)
+    safety = load_scenario("paper").safety
+    least_m = situations.least_margin_m(vehicles, safety)
+    assert least_m >= safety.execution_allowance_m - 1e-6
+
+
+@pytest.mark.parametrize("slots", [1, 2])
+def test_rewards_are_numbers_however_few_slots_there_are(slots):
+    env = made(agents="all", slots=slots, **BUSY)
+    for seed in range(3):
+        seen = driven(env, seed, at_random((slots,)), 400)
+        assert all(math.isfinite(step[1]) for step in seen[1:])
+
+
+class Counting(MainlinePriority):
+    """Remembers how often it has decided."""
+
+    name = "counting"
+    asked: ClassVar[list] = []
+
+    def decide(self, view, memory):
+        self.asked.append(memory)
+        decision = super().decide(view, None)
+        return dataclasses.replace(decision, memory=(memory or 0) + 1)
+
+
+def test_agents_do_not_make_the_others_forget():
+    coramp.register(Counting)
+    Counting.asked.clear()
+    driven(made(others="counting", **BUSY), 4, lambda *_: np.zeros(1), 60)
+    assert Counting.asked == [None, *range(1, len(Counting.asked))]
+    assert len(Counting.asked) > 5
 
 
 def test_an_agent_that_keeps_going_merges_and_the_episode_ends():
@@ -117,6 +153,9 @@ def test_all_agents_are_front_first_and_share_the_slots():
     [
         ({"agents": "some"}, "agents: 'some' cannot be; allowed are one, all"),
         ({"horizon_s": 10.0}, "horizon_s: 10 cannot be; allowed is above 30 s"),
+        ({"period_s": math.nan}, "period_s: nan cannot be; allowed is above 0"),
+        ({"period_s": -1.0}, "period_s: -1 cannot be"),
+        ({"longest_s": 0.1}, "longest_s: 0.1 cannot be; allowed is period_s, 0.5, and more"),
         ({"slots": 0}, "slots: 0 cannot be; allowed is at least 1"),
         ({"others": "ocbf"}, "others: ocbf does not plan"),
         ({"others": "alinea"}, "others: alinea does not plan"),
@@ -126,6 +165,11 @@ def test_all_agents_are_front_first_and_share_the_slots():
 def test_what_cannot_be_is_refused(settings, said):
     with pytest.raises(CorampError, match=said):
         made(**settings)
+
+
+def test_a_ramp_without_anybody_is_told_and_not_waited_for():
+    with pytest.raises(CorampError, match="ramp_veh_h: no ramp vehicle came"):
+        made(ramp_veh_h=0.0).reset(seed=1)
 
 
 def test_an_action_that_is_not_finite_is_refused():

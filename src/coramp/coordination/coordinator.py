@@ -287,7 +287,7 @@ class Coordinator:
         time_s = step * self._step_s
         drives = [c for c in decision.commands if isinstance(c, DriveWithAcceleration)]
         if drives:
-            self._drive(drives, step)
+            self.drive(drives, step)
         trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]
         margin_m = math.nan
         if trajectories:
@@ -308,7 +308,8 @@ class Coordinator:
             if wake_step > step:
                 self._moves_up(row, step)
 
-    def _drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> None:
+    def drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> int:
+        """Carries out what is safe of commanded accelerations; returns how many were refused."""
         carried_out = drive_safely(
             self.ledger,
             commands,
@@ -317,10 +318,12 @@ class Coordinator:
             self._packed,
             self._examiner.bounds,
         )
-        self.interventions += len(commands) - sum(carried_out)
         for command, driven in zip(commands, carried_out, strict=True):
             if driven:
                 self._announce(command.row, step)
+        refused = len(commands) - sum(carried_out)
+        self.interventions += refused
+        return refused
 
     def _announce(self, row: int, step: int) -> None:
         """Tells who carries the vehicle, and when it is planned, of its new commitment."""
