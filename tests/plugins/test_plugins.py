@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 
 import coramp
-from coramp.coordination.guard import Guarded, time_limit
+from coramp.coordination.guard import Guarded
+from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
 from coramp.skeleton import write_skeleton
 from coramp.strategies.base import Decision, DriveWithAcceleration, FollowTrajectory
@@ -54,6 +56,67 @@ def asleep(_):
             continue
 
 
+def swallowing_everything(_):
+    while True:
+        try:  # noqa: SIM105
+            time.sleep(60)
+        except:  # noqa: E722 - as a very careless strategy does
+            pass
+
+
+def busy_and_swallowing_everything(_):
+    while True:
+        try:  # noqa: SIM105
+            sum(range(1000))
+        except:  # noqa: E722 - as a very careless strategy does
+            pass
+
+
+def leaving(_):
+    sys.exit(0)
+
+
+def telling_a_tale(_):
+    raise RuntimeError("one line\nanother   line\n")
+
+
+def commanding_nothing_at_all(_):
+    return Decision(commands=None)
+
+
+def waking_by_halves(_):
+    return Decision(wakes_s=(5.0,))
+
+
+def steering_by_none(decide):
+    return Decision((DriveWithAcceleration(decide.commands[0].row, None, 0.5),))
+
+
+def merging_some_time(decide):
+    command = decide.commands[0]
+    return Decision((FollowTrajectory(command.row, command.pieces, None),))
+
+
+def commanding_half_a_row(decide):
+    command = decide.commands[0]
+    return Decision((FollowTrajectory(float(command.row), command.pieces, command.merge_time_s),))
+
+
+def explaining_by_magic(decide):
+    story = decide.explanations[0]._replace(rung="magic")
+    return Decision(decide.commands, explanations=(story,))
+
+
+def explaining_by_nobody(decide):
+    story = decide.explanations[0]._replace(row=9999)
+    return Decision(decide.commands, explanations=(story,))
+
+
+def explaining_without_numbers(decide):
+    story = decide.explanations[0]._replace(gap_m=None)
+    return Decision(decide.commands, explanations=(story,))
+
+
 def answering_nothing(_):
     return None
 
@@ -81,6 +144,18 @@ MISTAKES = [
     (not_finite, "commands numbers that are not finite"),
     (commanding_nobody, "commands an unknown vehicle, row 9999"),
     (asleep, "takes longer than"),
+    (swallowing_everything, "takes longer than"),
+    (busy_and_swallowing_everything, "takes longer than"),
+    (leaving, "raises SystemExit: 0"),
+    (telling_a_tale, "raises RuntimeError: one line another line"),
+    (commanding_nothing_at_all, "returns what is no decision"),
+    (waking_by_halves, "returns what is no decision"),
+    (steering_by_none, "returns what is no decision"),
+    (merging_some_time, "returns what is no decision"),
+    (commanding_half_a_row, "commands an unknown vehicle, row "),
+    (explaining_by_magic, "explains itself by rung 'magic'; allowed are free, reach"),
+    (explaining_by_nobody, "commands an unknown vehicle, row 9999"),
+    (explaining_without_numbers, "returns what is no decision"),
     (answering_nothing, "returns NoneType; allowed is a Decision"),
     (remembering_a_list, "has a memory that is not hashable"),
     (waking_in_the_past, "asks to be woken at -1.0 s"),
@@ -190,6 +265,51 @@ def test_the_time_limit_leaves_no_alarm():
     with time_limit(0.05):
         pass
     time.sleep(0.1)
+
+
+@pytest.mark.parametrize("busy", [busy_and_swallowing_everything, swallowing_everything])
+def test_the_time_limit_is_kept_every_time(busy):
+    for _ in range(10):
+        with pytest.raises(TooLong), time_limit(0.02):
+            busy(None)
+
+
+def test_the_time_limit_holds_in_other_threads():
+    told = []
+
+    def work():
+        for _ in range(3):
+            try:
+                with time_limit(0.1):
+                    while True:
+                        time.sleep(0.01)
+            except TooLong:
+                told.append("too long")
+        with time_limit(0.1):
+            pass
+        time.sleep(0.2)
+        told.append("goes on")
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join(20.0)
+    assert told == ["too long"] * 3 + ["goes on"]
+
+
+def test_one_that_takes_too_long_to_be_made_is_named(monkeypatch):
+    class Slow:
+        name, summary, cooperative = "slow", "thinks before it begins", True
+
+        def __init__(self):
+            time.sleep(60)
+
+        def decide(self, view, memory):
+            return Decision()
+
+    monkeypatch.setattr("coramp.coordination.guard.LONGEST_DECISION_S", 0.2)
+    coramp.register(Slow)
+    with pytest.raises(CorampError, match=r"strategy slow: takes longer than 0\.2 s to be made"):
+        coramp.run("paper", "slow", engine="exact", horizon_s=30)
 
 
 def test_a_correct_strategy_of_ones_own_decides_as_it_would_unguarded():

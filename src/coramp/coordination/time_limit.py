@@ -9,7 +9,7 @@ from types import FrameType
 
 from coramp._kernel import compiling
 
-AGAIN_S = 2e-4
+AGAIN_S = 2e-5
 """Once the time is over it is said this often: code that swallows one word does not get far."""
 
 
@@ -32,10 +32,11 @@ def time_limit(longest_s: float) -> Iterator[None]:
 @contextmanager
 def _by_alarm(longest_s: float) -> Iterator[None]:
     def give_up(_: int, frame: FrameType | None) -> None:
-        if compiling():
-            signal.setitimer(signal.ITIMER_REAL, longest_s, AGAIN_S)
-        elif frame is not None and frame.f_code.co_filename not in _LEAVING:
+        if frame is None or frame.f_code.co_filename in _LEAVING:
+            return
+        if not compiling():
             raise TooLong
+        signal.setitimer(signal.ITIMER_REAL, longest_s, AGAIN_S)
 
     before = signal.signal(signal.SIGALRM, give_up)
     signal.setitimer(signal.ITIMER_REAL, longest_s, AGAIN_S)
@@ -43,7 +44,11 @@ def _by_alarm(longest_s: float) -> Iterator[None]:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, _nothing if before is signal.SIG_DFL else before)
+
+
+def _nothing(*_: object) -> None:
+    """Takes a last alarm that was under way when the timer stopped; by default it would kill."""
 
 
 _LEAVING = frozenset({__file__, contextmanager.__code__.co_filename, signal.__file__})
