@@ -87,37 +87,29 @@ def largest_jerk_mps3(first: IntArray, rows: FloatArray, until_s: FloatArray) ->
     """
     largest = 0.0
     for i in range(len(until_s)):
-        times_s, speeds_mps = (
-            rows[first[i] : first[i + 1], TIME],
-            rows[first[i] : first[i + 1], SPEED],
-        )
-        accels_mps2 = rows[first[i] : first[i + 1], ACCEL]
-        for k in range(len(times_s)):
-            for lag_s in (-JERK_S, 0.0, JERK_S):
-                now_s = times_s[k] + lag_s
-                if now_s - JERK_S < times_s[0] or now_s + JERK_S > until_s[i]:
-                    continue
-                second = (
-                    _speed_at(times_s, speeds_mps, accels_mps2, now_s + JERK_S)
-                    - 2.0 * _speed_at(times_s, speeds_mps, accels_mps2, now_s)
-                    + _speed_at(times_s, speeds_mps, accels_mps2, now_s - JERK_S)
-                )
-                largest = max(largest, abs(second) / JERK_S**2)
+        own = rows[first[i] : first[i + 1]]
+        at = np.zeros(5, np.int64)
+        speeds_mps = np.zeros(5)
+        for k in range(len(own)):
+            for j in range(5):
+                now_s = own[k, TIME] + (j - 2) * JERK_S
+                at[j] = _last_started(own, at[j], now_s)
+                speeds_mps[j] = own[at[j], SPEED] + own[at[j], ACCEL] * (now_s - own[at[j], TIME])
+            for j in range(1, 4):
+                now_s = own[k, TIME] + (j - 2) * JERK_S
+                if own[0, TIME] <= now_s - JERK_S and now_s + JERK_S <= until_s[i]:
+                    second = speeds_mps[j + 1] - 2.0 * speeds_mps[j] + speeds_mps[j - 1]
+                    largest = max(largest, abs(second) / JERK_S**2)
     return largest
 
 
 @kernel
-def _speed_at(
-    times_s: FloatArray, speeds_mps: FloatArray, accels_mps2: FloatArray, now_s: float
-) -> float:
-    low, high = 0, len(times_s)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if times_s[middle] <= now_s:
-            low = middle
-        else:
-            high = middle
-    return float(speeds_mps[low] + accels_mps2[low] * (now_s - times_s[low]))
+def _last_started(rows: FloatArray, from_row: int, now_s: float) -> int:
+    """Returns the last row that has started by then, from ``from_row`` on."""
+    row = from_row
+    while row + 1 < len(rows) and rows[row + 1, TIME] <= now_s:
+        row += 1
+    return row
 
 
 def pieces_of_samples(
