@@ -20,6 +20,7 @@ from coramp.loading import drivers_checked, load_scenario
 from coramp.metrics.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS
 from coramp.metrics.tables import Row, RunTables, tables_of
 from coramp.scenario import Scenario
+from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 
 ENGINES = ("sumo", "exact")
@@ -114,6 +115,8 @@ def make_spec(
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    if is_metered(chosen) and loaded.signal_problem:
+        raise CorampError(loaded.signal_problem)
     population = None
     if drivers is not None or not chosen.cooperative:
         population = drivers_checked(loaded, drivers or DEFAULT_DRIVERS)

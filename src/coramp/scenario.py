@@ -20,6 +20,8 @@ from coramp.strategies.registry import strategy_named
 
 FASTEST_MPS = 60.0
 NEAREST_STOP_M = -1.0
+SIGNAL_STATION_M = -60.0
+REACTION_S = 1.0
 LONGEST_STEP_S = 0.25
 """Up to here SUMO was seen to stay within 5 cm of the plan; the error grows with the square."""
 SHORTEST_EDGE_M = 1.0
@@ -60,6 +62,8 @@ class Ramp(Model):
     ``stop_station_m`` is where a vehicle stops that has no merge yet; left out, it is as near to
     the nose as still lets it reach v0 in time from a stand. ``detector_station_m`` is that of the
     mainline's loop for ramp metering; left out, it is three quarters along the lane.
+    ``signal_station_m`` is that of its stop line; left out, it is 60 m before the nose, or a
+    quarter of a shorter ramp, so that who was stopped can speed up before it merges.
     """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
@@ -73,6 +77,7 @@ class Ramp(Model):
     decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0
     stop_station_m: Annotated[float, Field(lt=0.0)] | None = None
     detector_station_m: Annotated[float, Field(gt=0.0)] | None = None
+    signal_station_m: Annotated[float, Field(le=-1.0)] | None = None
 
 
 class Vehicle(Model):
@@ -223,6 +228,25 @@ class Scenario(Model):
         """Station of the loop on the mainline beside the acceleration lane."""
         given = self.ramp.detector_station_m
         return 0.75 * self.ramp.acceleration_lane_m if given is None else given
+
+    @property
+    def signal_station_m(self) -> float:
+        """Station of the stop line of ramp metering."""
+        given = self.ramp.signal_station_m
+        return max(SIGNAL_STATION_M, 0.25 * self.ramp.start_m) if given is None else given
+
+    @property
+    def signal_problem(self) -> str:
+        """What keeps the ramp from being metered: who enters must be able to stop at the line."""
+        speed_mps = self.ramp.limit_mps
+        braking_m = 0.5 * speed_mps**2 / self.motion.comfort_mps2
+        first_m = self.ramp.start_m + speed_mps * REACTION_S + braking_m
+        if self.signal_station_m >= first_m:
+            return ""
+        return (
+            f"ramp.signal_station_m: {self.signal_station_m:g} is too near to the ramp's start to "
+            f"stop at; allowed is {first_m:.1f} to -1 m"
+        )
 
     @property
     def stop_mps2(self) -> float:

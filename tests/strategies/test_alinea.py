@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coramp.coordination.ledger import Ledger
 from coramp.core.rules import packed
+from coramp.errors import CorampError
 from coramp.loading import load_scenario
 from coramp.strategies.alinea import Alinea
 from coramp.strategies.base import Detectors, SetRampSignal, View
@@ -89,6 +92,35 @@ def test_one_vehicle_a_green():
 def test_green_waits_for_somebody():
     memory, _ = driven(Alinea(), lambda *_: 0.5, 600, waiting=False)
     assert memory.green
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(0, 3)),
+        min_size=1,
+        max_size=200,
+    )
+)
+def test_whatever_the_loops_tell_the_rate_is_within_its_bounds_and_the_answer_the_same(told):
+    law, memory, green = Alinea(update_s=5.0), None, True
+    for second, one in enumerate(told, 1):
+        seen = view(float(second), *one)
+        decision = law.decide(seen, memory)
+        assert law.decide(seen, memory) == decision
+        memory = decision.memory
+        assert 240.0 <= memory.rate_veh_h <= 1200.0
+        for command in decision.commands:
+            assert command.green != green
+            green = command.green
+        assert memory.green == green
+
+
+def test_rates_that_leave_nothing_to_meter_are_refused():
+    assert Alinea().problems() == []
+    (told,) = Alinea(least_veh_h=1300.0).problems()
+    assert told == "least_veh_h: 1300 meters nothing; allowed is below most_veh_h, 1200"
+    with pytest.raises(CorampError, match=r"strategy.alinea.least_veh_h: 1300 meters nothing"):
+        load_scenario("paper", {"strategy.alinea.least_veh_h": 1300.0})
 
 
 def test_decisions_depend_on_the_memory_alone():

@@ -43,7 +43,7 @@ class Alinea:
     metered: ClassVar[bool] = True
 
     target_occupancy_percent: float = parameter(
-        18.0, 1.0, 80.0, meaning="o_target, at the loop beside the acceleration lane"
+        20.0, 1.0, 80.0, meaning="o_target, at the loop beside the acceleration lane"
     )
     gain_veh_h: float = parameter(70.0, 1.0, 1000.0, meaning="K, per % of occupancy")
     update_s: float = parameter(30.0, 5.0, 300.0, meaning="time between two updates of the rate")

@@ -204,6 +204,6 @@ def held_period_s(period_s: float, rules: Rules) -> float:
     return steps_of_period(period_s, rules.control.step_s) * rules.control.step_s
 
 
-def is_metered(strategy: Decider) -> bool:
+def is_metered(strategy: Decider | type[Strategy]) -> bool:
     """Returns whether a strategy needs a signal and detectors at the ramp."""
     return bool(getattr(strategy, "metered", False))

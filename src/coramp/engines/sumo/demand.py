@@ -6,7 +6,7 @@ from coramp.coordination.plant import Arrival
 from coramp.scenario import Drivers, Scenario
 
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
-  <route id="ramp" edges="ramp merge downstream"/>"""
+  <route id="ramp" edges="{ramp} merge downstream"/>"""
 
 
 def cooperative_type(length_m: float) -> str:
@@ -38,7 +38,9 @@ def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_veh
     return _file(cooperative_types(arrivals), vehicles)
 
 
-def driver_routes(scenario: Scenario, drivers: Drivers, arrivals: Sequence[Arrival]) -> str:
+def driver_routes(
+    scenario: Scenario, drivers: Drivers, arrivals: Sequence[Arrival], metered: bool = False
+) -> str:
     """Returns the route file of an uncontrolled run with a population of drivers.
 
     Drivers who wish their entry speed get a type of their own each, by ``maxSpeed``. Drivers who
@@ -59,7 +61,7 @@ def driver_routes(scenario: Scenario, drivers: Drivers, arrivals: Sequence[Arriv
             name = f"driver-{arrival.length_m!r}"
         types[name] = _driver_type(name, drivers, wish_mps, arrival.length_m)
         vehicles.append(_vehicle(arrival, name, entry_mps, step_s))
-    return _file(list(types.values()), vehicles)
+    return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
 
 
 def _driver_type(name: str, drivers: Drivers, wish_mps: float, length_m: float) -> str:
@@ -80,5 +82,5 @@ def _vehicle(arrival: Arrival, kind: str, speed_mps: float, step_s: float) -> st
     )
 
 
-def _file(types: Sequence[str], vehicles: Sequence[str]) -> str:
-    return "\n".join(["<routes>", *types, ROUTES, *vehicles, "</routes>", ""])
+def _file(types: Sequence[str], vehicles: Sequence[str], ramp: str = "ramp") -> str:
+    return "\n".join(["<routes>", *types, ROUTES.format(ramp=ramp), *vehicles, "</routes>", ""])

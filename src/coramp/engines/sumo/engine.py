@@ -25,13 +25,13 @@ from coramp.engines.outcomes import (
 from coramp.engines.sumo.cooperative import CooperativePlant
 from coramp.engines.sumo.demand import cooperative_routes, driver_routes
 from coramp.engines.sumo.metering import Meter, loops
-from coramp.engines.sumo.network import RoadPlan, network_file, road_plan
+from coramp.engines.sumo.network import RAMP_LANES, RoadPlan, network_file, road_plan
 from coramp.engines.sumo.session import Session
 from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records import Outcome, Pieces
 from coramp.scenario import Drivers, Scenario
-from coramp.strategies.base import Decider, is_metered, period_of
+from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
@@ -125,19 +125,20 @@ def run_uncontrolled(
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
-        files.write_routes(driver_routes(scenario, drivers, arrivals))
+        files.write_routes(driver_routes(scenario, drivers, arrivals, metered))
         look_steps = round(LOOK_S / step_s)
         if metered:
-            look_steps = max(1, round((period_of(strategy) or LOOK_S) / step_s))
+            look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
             files.write_loops(loops(scenario, look_steps * step_s))
         with Session(files.options(), step_s, options.gui) as session:
             meter = Meter(session, scenario, strategy) if metered else None
             step = 0
             while step < cap_step and (step == 0 or session.vehicles_left()):
-                step = min(cap_step, step + look_steps)
-                session.step_to(step)
+                until = min(cap_step, step + look_steps)
                 if meter is not None:
-                    meter.decide(step * step_s)
+                    meter.run(step, until)
+                session.step_to(until)
+                step = until
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions = files.collisions()
@@ -272,7 +273,7 @@ class _Files:
         """Returns all positions, by vehicle and time."""
         starts_m = self._plan.lane_starts_m()
         number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
-        on_mainline = {lane: lane not in ("ramp_0", "merge_0", ":nose_1_0") for lane in starts_m}
+        on_mainline = {lane: lane not in RAMP_LANES for lane in starts_m}
         lane = pl.col("vehicle_lane")
         written = pl.read_parquet(self._folder / "fcd.parquet")
         if "vehicle_id" not in written.columns:  # nobody ever drove

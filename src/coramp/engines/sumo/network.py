@@ -2,7 +2,8 @@
 
 Edges are ``mainline`` and ``ramp`` up to station 0, ``merge`` along the acceleration lane and
 ``downstream`` behind it. The acceleration lane (lane 0 of ``merge``) is a dead end, so that merging
-is a lane change. x is the mainline's station.
+is a lane change. x is the mainline's station. Where the ramp is metered, ``ramp`` ends at the stop
+line and ``gore`` leads on from there.
 """
 
 import atexit
@@ -22,6 +23,7 @@ from coramp.errors import CorampError
 from coramp.scenario import Scenario
 
 LANE_WIDTH_M = 3.2
+RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})
 JUNCTION_LENGTH_M = 0.001
 """What SUMO's lanes inside a node take from a vehicle's way; less than it prints."""
 LENGTH_TOLERANCE_M = 0.002
@@ -43,23 +45,27 @@ class RoadPlan:
     mainline_limit_mps: float
     ramp_limit_mps: float
     merge_angle_deg: float
-    metered: bool = False
+    gore_m: float = 0.0
 
     def lane_lengths_m(self) -> dict[str, float]:
         """Returns the length that each lane must have."""
-        return {
+        lengths_m = {
             "mainline_0": self.mainline_m,
-            "ramp_0": self.ramp_m,
+            "ramp_0": self.ramp_m - self.gore_m,
+            "gore_0": self.gore_m,
             "merge_0": self.acceleration_lane_m,
             "merge_1": self.acceleration_lane_m,
             "downstream_0": self.downstream_m,
         }
+        return {lane: length_m for lane, length_m in lengths_m.items() if length_m > 0.0}
 
     def lane_starts_m(self) -> dict[str, float]:
         """Returns the station at which each lane begins; lanes inside nodes included."""
         return {
             "mainline_0": -self.mainline_m,
             "ramp_0": -self.ramp_m,
+            ":stopline_0_0": -self.gore_m,
+            "gore_0": -self.gore_m,
             ":nose_0_0": 0.0,
             ":nose_1_0": 0.0,
             "merge_0": 0.0,
@@ -74,7 +80,7 @@ def road_plan(
 ) -> RoadPlan:
     """Returns the plan of a scenario's road, with another speed limit on the ramp if given.
 
-    ``metered`` puts a signal at the nose.
+    ``metered`` puts a signal on the ramp.
     """
     mainline, ramp = scenario.mainline, scenario.ramp
     return RoadPlan(
@@ -85,7 +91,7 @@ def road_plan(
         mainline_limit_mps=mainline.limit_mps,
         ramp_limit_mps=ramp.limit_mps if ramp_limit_mps is None else ramp_limit_mps,
         merge_angle_deg=ramp.merge_angle_deg,
-        metered=metered,
+        gore_m=-scenario.signal_station_m if metered else 0.0,
     )
 
 
@@ -142,29 +148,38 @@ def ramp_shape_m(plan: RoadPlan) -> list[tuple[float, float]]:
     return [start, bend, (0.0, -LANE_WIDTH_M)]
 
 
+def _gore_shape_m(plan: RoadPlan) -> list[tuple[float, float]]:
+    """The ramp's centre line from the stop line on."""
+    start, bend, nose = ramp_shape_m(plan)
+    beside_m = nose[0] - bend[0]
+    if plan.gore_m <= beside_m:
+        return [(-plan.gore_m, bend[1]), nose]
+    share = (plan.gore_m - beside_m) / (plan.ramp_m - beside_m)
+    line = (bend[0] + share * (start[0] - bend[0]), bend[1] + share * (start[1] - bend[1]))
+    return [line, bend, nose]
+
+
 def _nodes(plan: RoadPlan) -> str:
     end_m = plan.acceleration_lane_m + plan.downstream_m
     (ramp_x, ramp_y), *_ = ramp_shape_m(plan)
-    nose = "traffic_light" if plan.metered else "unregulated"
     places = [
         ("west", -plan.mainline_m, 0.0, ""),
         ("rampstart", ramp_x, ramp_y, ""),
-        ("nose", 0.0, 0.0, f' type="{nose}" radius="0"'),
+        ("nose", 0.0, 0.0, ' type="unregulated" radius="0"'),
         ("end", plan.acceleration_lane_m, 0.0, ' type="unregulated" radius="0"'),
         ("east", end_m, 0.0, ""),
     ]
+    if plan.gore_m > 0.0:
+        places.append(("stopline", *_gore_shape_m(plan)[0], ' type="traffic_light" radius="0"'))
     lines = [f'  <node id="{n}" x="{x:.6f}" y="{y:.6f}"{rest}/>' for n, x, y, rest in places]
     return "\n".join(["<nodes>", *lines, "</nodes>"])
 
 
 def _edges(plan: RoadPlan) -> str:
-    main, ramp = plan.mainline_limit_mps, plan.ramp_limit_mps
-    shape = " ".join(f"{x:.6f},{y:.6f}" for x, y in ramp_shape_m(plan))
-    edge_y = LANE_WIDTH_M / 2.0
+    main, edge_y = plan.mainline_limit_mps, LANE_WIDTH_M / 2.0
     return f"""<edges>
   <edge id="mainline" from="west" to="nose" numLanes="1" speed="{main!r}" spreadType="center"/>
-  <edge id="ramp" from="rampstart" to="nose" numLanes="1" speed="{ramp!r}" spreadType="center"
-        shape="{shape}" length="{plan.ramp_m!r}"/>
+{_ramp_edges(plan)}
   <edge id="merge" from="nose" to="end" numLanes="2" speed="{main!r}"
         shape="0,{edge_y} {plan.acceleration_lane_m!r},{edge_y}">
     <lane index="0" acceleration="1"/>
@@ -173,10 +188,36 @@ def _edges(plan: RoadPlan) -> str:
 </edges>"""
 
 
+def _ramp_edges(plan: RoadPlan) -> str:
+    def edge(name: str, ends: str, shape_m: list[tuple[float, float]], length_m: float) -> str:
+        shape = " ".join(f"{x:.6f},{y:.6f}" for x, y in shape_m)
+        return (
+            f'  <edge id="{name}" {ends} numLanes="1" speed="{plan.ramp_limit_mps!r}" '
+            f'spreadType="center" shape="{shape}" length="{length_m!r}"/>'
+        )
+
+    if plan.gore_m == 0.0:
+        return edge("ramp", 'from="rampstart" to="nose"', ramp_shape_m(plan), plan.ramp_m)
+    line, *rest = _gore_shape_m(plan)
+    start, *bends, _ = ramp_shape_m(plan)
+    before = [start, *(place for place in bends if place not in rest), line]
+    return "\n".join(
+        [
+            edge("ramp", 'from="rampstart" to="stopline"', before, plan.ramp_m - plan.gore_m),
+            edge("gore", 'from="stopline" to="nose"', [line, *rest], plan.gore_m),
+        ]
+    )
+
+
 def _connections(plan: RoadPlan) -> str:
     rest = f'length="{JUNCTION_LENGTH_M}" speed="{plan.mainline_limit_mps!r}"'
+    onto = "ramp"
+    ramp = ""
+    if plan.gore_m > 0.0:
+        ramp = f'  <connection from="ramp" to="gore" fromLane="0" toLane="0" {rest}/>\n'
+        onto = "gore"
     return f"""<connections>
   <connection from="mainline" to="merge" fromLane="0" toLane="1" {rest}/>
-  <connection from="ramp" to="merge" fromLane="0" toLane="0" {rest}/>
+{ramp}  <connection from="{onto}" to="merge" fromLane="0" toLane="0" {rest}/>
   <connection from="merge" to="downstream" fromLane="1" toLane="0" {rest}/>
 </connections>"""

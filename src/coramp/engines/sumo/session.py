@@ -123,8 +123,11 @@ class Session:
         libsumo.trafficlight.setRedYellowGreenState(signal, state)
 
     def loop_occupancy(self, loop: str) -> float:
-        """Returns the share of its last period for which a loop was occupied."""
-        return float(libsumo.inductionloop.getLastIntervalOccupancy(loop)) / 100.0
+        """Returns the share of the last step for which a loop was occupied.
+
+        SUMO's figure for an interval leaves out who still stands on the loop at its end.
+        """
+        return float(libsumo.inductionloop.getLastStepOccupancy(loop)) / 100.0
 
     def vehicles_on(self, lane: str) -> set[str]:
         """Returns who is on a lane now."""
