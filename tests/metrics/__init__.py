@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.loading import load_scenario
 from coramp.records import Outcome, Passages, Pieces
 
@@ -31,10 +32,26 @@ class Car:
         return self.name.startswith("r")
 
 
+def in_lanes(car):
+    """Pieces with the code of the lane that each is driven in; a merge begins one of its own."""
+    if not car.on_ramp:
+        return [(row, MAINLINE) for row in car.pieces]
+    known = []
+    for k, (t, s, v, a) in enumerate(car.pieces):
+        known.append(((t, s, v, a), MAINLINE if t >= car.merge_s else RAMP))
+        ends_s = car.pieces[k + 1][0] if k + 1 < len(car.pieces) else math.inf
+        if t < car.merge_s < ends_s:
+            x = car.merge_s - t
+            known.append(((car.merge_s, s + (v + a * x / 2) * x, v + a * x, a), MAINLINE))
+    return known
+
+
 def outcome_of(cars, end_s, **rest):
     """Returns the outcome of a run with these vehicles; they drove what was planned."""
-    first = np.cumsum([0, *(len(car.pieces) for car in cars)]).astype(np.int64)
-    rows = np.array([row for car in cars for row in car.pieces], dtype=float).reshape(-1, 4)
+    known = [in_lanes(car) for car in cars]
+    first = np.cumsum([0, *map(len, known)]).astype(np.int64)
+    rows = np.array([row for own in known for row, _ in own], dtype=float).reshape(-1, 4)
+    lane = np.array([code for own in known for _, code in own], dtype=np.int64)
 
     def column(name):
         return np.array([getattr(car, name) for car in cars], dtype=float)
@@ -53,7 +70,7 @@ def outcome_of(cars, end_s, **rest):
     pieces = Pieces(first, rows)
     content = {
         "cooperative": False,
-        "lane": np.full(len(rows), 2),
+        "lane": lane,
         "driven": pieces,
         "collisions": 0,
         **rest,

@@ -55,6 +55,18 @@ def test_the_order_of_vehicles_in_the_records_does_not_matter():
     assert figures(*cars) == figures(*reversed(cars))
 
 
+def test_who_overtakes_on_the_acceleration_lane_is_no_neighbour_meanwhile():
+    """SUMO's drivers do so where the mainline stands: 3 m behind one, beside it, 1 m before it."""
+    cars = [
+        steady("m1", 100.0, 0.0, 20.0),
+        Car("m2", ((0.0, 90.0, 2.0, 0.0), (1.0, 92.0, 2.0, 0.0), (8.0, 106.0, 2.0, 0.0))),
+    ]
+    found = figures(*cars, end_s=12.0, lane=np.array([2, 2, 0, 2]))
+    assert found["safety_violations"] == 0
+    assert found["min_margin_m"] == pytest.approx(106.0 - 5.0 - 100.0 - eq_1(2.0, 0.0))
+    assert found["min_ttc_s"] == pytest.approx(3.0 / 2.0)
+
+
 def test_too_near_is_one_violation_however_long_it_lasts():
     found = figures(steady("m1", 100.0, 10.0, 4.0), steady("m2", 50.0, 20.0, 4.0))
     assert found["min_margin_m"] == pytest.approx(5.0 - eq_1(10.0, 20.0))

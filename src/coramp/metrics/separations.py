@@ -34,12 +34,13 @@ FIGURES, NOTED = 5, 4
 
 
 class LaneUse(NamedTuple):
-    """Who uses a lane when. Vehicle i drives ``rows[first[i] : first[i + 1]]``.
+    """Stays in a lane: who uses it when. Vehicle v drives ``rows[first[v] : first[v + 1]]``.
 
-    It is in the lane from ``from_s[i]`` (nan: never) to ``until_s[i]``, and came by a lane change
-    if ``merges[i]``.
+    Stay i is that of ``vehicle[i]``, from ``from_s[i]`` (nan: never) to ``until_s[i]``; it began
+    with a lane change if ``merges[i]``. A vehicle may come to a lane more than once.
     """
 
+    vehicle: IntArray
     first: IntArray
     rows: FloatArray
     length_m: FloatArray
@@ -116,9 +117,15 @@ def lane_events(lane: LaneUse) -> tuple[FloatArray, IntArray, IntArray]:
 
 
 @kernel
-def driven(lane: LaneUse, vehicle: int) -> FloatArray:
-    """Returns the pieces that a vehicle drove."""
+def driven(lane: LaneUse, stay: int) -> FloatArray:
+    """Returns the pieces that the vehicle of a stay drove."""
+    vehicle = lane.vehicle[stay]
     return lane.rows[lane.first[vehicle] : lane.first[vehicle + 1]]
+
+
+@kernel
+def _length_m(lane: LaneUse, stay: int) -> float:
+    return float(lane.length_m[lane.vehicle[stay]])
 
 
 @kernel
@@ -149,14 +156,12 @@ def _end_pair(
     end_s: float,
     safety: SafetyBudget,
 ) -> None:
-    ahead, behind = driven(lane, front), driven(lane, rear)
-    margin_m, least_s = smallest_margin_m(
-        ahead, lane.length_m[front], behind, start_s, end_s, safety
-    )
+    ahead, behind, length_m = driven(lane, front), driven(lane, rear), _length_m(lane, front)
+    margin_m, least_s = smallest_margin_m(ahead, length_m, behind, start_s, end_s, safety)
     extremes[MARGIN] = min(extremes[MARGIN], margin_m)
     if margin_m < 0.0:
-        _note_violation(extremes, least_s, front, rear, margin_m)
-    ttc_s, drac_mps2 = closing_extremes(ahead, lane.length_m[front], behind, start_s, end_s)
+        _note_violation(extremes, least_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
+    ttc_s, drac_mps2 = closing_extremes(ahead, length_m, behind, start_s, end_s)
     extremes[TTC] = min(extremes[TTC], ttc_s)
     extremes[DRAC] = max(extremes[DRAC], drac_mps2)
 
@@ -185,14 +190,14 @@ def _look_at_merge(
     own_m, own_mps = station_and_speed(driven(lane, merging), now_s)
     other_m, other_mps = station_and_speed(driven(lane, other), now_s)
     front, rear = other, merging
-    distance_m = other_m - lane.length_m[other] - own_m
+    distance_m = other_m - _length_m(lane, other) - own_m
     if other_m < own_m:
         front, rear = merging, other
-        distance_m = own_m - lane.length_m[merging] - other_m
+        distance_m = own_m - _length_m(lane, merging) - other_m
     along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
     margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
     if margin_m < 0.0:
-        _note_violation(extremes, now_s, front, rear, margin_m)
+        _note_violation(extremes, now_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
     severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)
 

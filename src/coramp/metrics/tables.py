@@ -13,6 +13,7 @@ from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
 from coramp.metrics.fitting import fitted_pieces
+from coramp.metrics.lane_uses import lane_uses
 from coramp.metrics.motion import (
     BIN_S,
     binned_motion,
@@ -28,7 +29,6 @@ from coramp.metrics.separations import (
     NOTED,
     SEVERITY,
     TTC,
-    LaneUse,
     lane_extremes,
 )
 from coramp.metrics.separations import VIOLATIONS as COUNT
@@ -313,25 +313,11 @@ def _largest_jerk_mps3(outcome: Outcome) -> float:
 
 def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:
     """What ``lane_extremes`` finds on the mainline and on the ramp."""
-    passages, driven = outcome.passages, outcome.driven
     rules = scenario.rules()
-    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
-    until_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
-    on_mainline_s = np.where(passages.on_ramp, passages.merge_s, passages.entry_s)
-    off_ramp_s = np.where(np.isnan(passages.merge_s), until_s, passages.merge_s)
-    on_ramp_s = np.where(passages.on_ramp, passages.entry_s, np.nan)
-    extremes = []
-    for from_s, to_s in ((on_mainline_s, until_s), (on_ramp_s, off_ramp_s)):
-        lane = LaneUse(
-            driven.first,
-            driven.rows,
-            passages.length_m,
-            from_s,
-            to_s,
-            passages.on_ramp & (from_s is on_mainline_s),
-        )
-        extremes.append(lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room))
-    return extremes
+    return [
+        lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room)
+        for lane in lane_uses(outcome)
+    ]
 
 
 def _finite(value: float) -> float | None:
