@@ -164,6 +164,15 @@ class StudyPlots:
 
         return field_figure(self._drawn("field"))
 
+    def plot_front(self) -> "Figure":
+        """Returns delay (s) against fuel (ml/vehicle) of every strategy, and the Pareto front.
+
+        Raises CorampError for a study whose layout is not ``field``, and where no run went well.
+        """
+        from coramp.report.front_figure import front_figure
+
+        return front_figure(self._drawn("field"))
+
     def plot_baseline(self) -> "Figure":
         """Returns delays (s) of each baseline, and of equal time gaps without and with a plan.
 

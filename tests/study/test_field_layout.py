@@ -8,6 +8,7 @@ import pytest
 from coramp.metrics.schemas import RUNS
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.field_figure import field_figure
+from coramp.report.front_figure import front_figure
 from coramp.strategies.registry import strategies
 from coramp.studies.baseline_layout import baseline_tables, settings_of
 from coramp.studies.definition import count_runs, expand, load_study
@@ -126,6 +127,27 @@ def test_the_figure_of_the_field_draws_what_there_is(field):
     assert xs == pytest.approx([50.0, 52.5, 40.0, 45.0] * 2)
 
 
+def test_the_figure_of_the_front_joins_who_is_on_it(field):
+    figure = front_figure(field)
+    assert [axes.get_title() for axes in figure.axes] == [
+        "the paper's nine flows",
+        "flows beyond capacity",
+    ]
+    joined = figure.axes[0].lines[0]
+    # ocbf: 0.75 s and 45 ml; game: (2 + 3) / 2 x 3/4 + 1/4 s and 40 ml
+    assert joined.get_xdata().tolist() == pytest.approx([0.75, 2.125])
+    assert joined.get_ydata().tolist() == pytest.approx([45.0, 40.0])
+
+
+def test_a_delay_below_none_is_drawn_too(field):
+    early = field.with_columns(
+        ramp_delay_s=pl.when(pl.col("strategy") == "ocbf")
+        .then(-9.0)
+        .otherwise(pl.col("ramp_delay_s"))
+    )
+    assert field_figure(early).axes[0].get_xlim()[0] <= -1.5
+
+
 def baseline_rows():
     flow = (1800.0, 500.0)
     made = [
@@ -176,6 +198,17 @@ def test_the_rate_against_each_baseline_by_hand():
         ("0.6", "uncoordinated ACC", "8.00 / 4.00"),
         ("0.6", "coordinated, mainline-priority", "0.40 / 0.20"),
     )
+
+
+def test_collisions_and_the_unserved_stand_beside_the_delay():
+    told = pl.when(pl.col("strategy") == "uncontrolled")
+    rows = baseline_rows().with_columns(
+        collisions=told.then(7).otherwise(0), unserved=told.then(3).otherwise(0)
+    )
+    rates, gaps = baseline_tables(rows)
+    assert rates.rows[0][5] == "5.00, u 3, c 7"
+    assert gaps.rows[1][2] == "8.00 / 4.00, u 3, c 7"
+    assert gaps.rows[2][2] == "0.40 / 0.20"
 
 
 def test_the_figure_of_the_baseline_draws_every_baseline():

@@ -66,6 +66,6 @@ def _finish(axes: Axes, column: str, title: str) -> None:
     if column in LOGARITHMIC:
         axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.set_xlim(left=0.0)
+    axes.set_xlim(left=min(0.0, axes.dataLim.x0))
     axes.set_xlabel(title)
     grid(axes)

@@ -15,6 +15,7 @@ from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.formula_figures import collision_figure, fuel_figure
+from coramp.report.front_figure import front_figure
 from coramp.report.road_figure import road_figure
 from coramp.report.run_figures import DrawnRun, margin_figure, speed_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
@@ -26,9 +27,9 @@ from coramp.snapshots import load_snapshot
 FORMATS = ("svg", "png")
 SCENARIO, EXAMPLE = "paper", "example"
 LONG_STUDIES = {
-    "capacity": capacity_figure,
-    "field": field_figure,
-    "baseline": baseline_figure,
+    "capacity": {"capacity": capacity_figure},
+    "field": {"field": field_figure, "field-front": front_figure},
+    "baseline": {"baseline": baseline_figure},
 }
 """Figures of studies that take some ten minutes; they are drawn where the study is given."""
 LEFT_OUT = (
@@ -89,6 +90,7 @@ def _catalogue(
     yield "rungs-by-flow", lambda: rung_figure(by_flow)
     yield "margins", lambda: margin_figure(runs, scenario.safety.execution_allowance_m)
     yield "sensitivity", lambda: sensitivity_figure(studies["sensitivity"].runs)
-    for layout, draw in LONG_STUDIES.items():
+    for layout, drawn in LONG_STUDIES.items():
         if layout in studies:
-            yield layout, partial(draw, studies[layout].runs)
+            for name, draw in drawn.items():
+                yield name, partial(draw, studies[layout].runs)

@@ -14,6 +14,7 @@ LANE = "ramp.acceleration_lane_m"
 GAP = "safety.time_gap_s"
 CONTROLLED = "mainline-priority"
 FLOW = ["mainline_veh_h", "ramp_veh_h"]
+MARKED = "u: vehicles that were not out at the end; c: collisions that SUMO saw; over all seeds."
 
 
 def baseline_tables(good: pl.DataFrame) -> list[Table]:
@@ -89,7 +90,7 @@ def _rates(runs: pl.DataFrame) -> list[Table]:
             f"{CONTROLLED} on the same lane. A dash where the drivers lose less than "
             f"{LEAST_BASELINE_S:g} s."
         ),
-        "u: vehicles that were not out at the end, over all seeds.",
+        MARKED,
     )
     table_rows = tuple(row for _, row in rows)
     return [Table("Improvement against each baseline", (*columns, *per_flow), table_rows, notes)]
@@ -108,8 +109,7 @@ def _rate_row(
     for flow in flows:
         nothing = estimate([])
         baseline, plan = drivers.get(flow, nothing), ours.get(flow, nothing)
-        left = own.filter(mainline_veh_h=flow[0], ramp_veh_h=flow[1])["unserved"].sum()
-        cells.append(with_interval(baseline) + (f", u {left}" if left else ""))
+        cells.append(with_interval(baseline) + _marks(own, flow))
         cells.append(percent(rate(plan.mean, baseline.mean, LEAST_BASELINE_S)))
     return tuple(cells)
 
@@ -141,8 +141,9 @@ def _gaps(runs: pl.DataFrame) -> list[Table]:
     if not rows or not flows:
         return []
     columns = ("time gap (s)", "vehicles", *(f"{m:g} + {r:g}" for m, r in flows))
-    note = "Mean delay of mainline / ramp in s, with 95 % intervals over seeds; u: unserved."
-    return [Table("The same time gaps without and with a plan", columns, tuple(rows), (note,))]
+    note = "Mean delay of mainline / ramp in s, with 95 % intervals over seeds."
+    notes = (note, MARKED)
+    return [Table("The same time gaps without and with a plan", columns, tuple(rows), notes)]
 
 
 def _at_own_lane(runs: pl.DataFrame, gap: float) -> pl.DataFrame:
@@ -164,7 +165,13 @@ def _delays(own: pl.DataFrame, flows: list[tuple[float, float]]) -> list[str]:
         if flow not in mainline:
             cells.append("-")
             continue
-        left = own.filter(mainline_veh_h=flow[0], ramp_veh_h=flow[1])["unserved"].sum()
         text = f"{with_interval(mainline[flow])} / {with_interval(ramp[flow])}"
-        cells.append(text + (f", u {left}" if left else ""))
+        cells.append(text + _marks(own, flow))
     return cells
+
+
+def _marks(own: pl.DataFrame, flow: tuple[float, float]) -> str:
+    """What a delay must not be read without: who was not out at the end, and who collided."""
+    there = own.filter(mainline_veh_h=flow[0], ramp_veh_h=flow[1])
+    counts = (("u", there["unserved"].sum()), ("c", there["collisions"].sum()))
+    return "".join(f", {mark} {count}" for mark, count in counts if count)

@@ -13,6 +13,7 @@ from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
+from coramp.report.front_figure import front_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import ShownRun, played
@@ -36,7 +37,10 @@ DRAWN = {
     ),
     "sensitivity": (("Delay by setting", sensitivity_figure),),
     "capacity": (("Where each strategy breaks down", capacity_figure),),
-    "field": (("Every strategy on the same arrivals", field_figure),),
+    "field": (
+        ("Delay against fuel, and who is on the front", front_figure),
+        ("Every strategy on the same arrivals", field_figure),
+    ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
 }
 
