@@ -20,6 +20,8 @@ from coramp.strategies.base import (
     period_of,
 )
 
+LATEST_EXIT_S = 600.0
+"""By then everyone who comes within a minute must be gone."""
 FLOWS_VEH_H = ((800.0, 200.0), (1800.0, 500.0), (2600.0, 900.0))
 
 
@@ -86,10 +88,16 @@ def _check(watched: Twice, scenario: Scenario, seed: int) -> None:
         scenario.fastest_mainline_entry_mps,
     )
     coordinator.expect_arrivals()
-    coordinator.run(round(600.0 / scenario.control.step_s))
+    coordinator.run(round(LATEST_EXIT_S / scenario.control.step_s))
     if watched.cooperative and not watched.asked:
         raise AssertionError(f"{watched.name} was never asked")
-    fleet = coordinator.ledger.fleet
-    undecided = [row for row in fleet.live if fleet.merge_time_s[row] == np.inf]
-    if watched.cooperative and undecided:
+    if not watched.cooperative:
+        return
+    ledger = coordinator.ledger
+    undecided = [row for row in ledger.fleet.live if ledger.merge_time_s(row) == np.inf]
+    if undecided:
         raise AssertionError(f"{watched.name} leaves {len(undecided)} ramp vehicles waiting")
+    if outside := len(coordinator.waiting()):
+        raise AssertionError(f"{watched.name} lets {outside} vehicles wait outside for ever")
+    if left := sum(ledger.exit_time_s(row) > LATEST_EXIT_S for row in range(len(ledger))):
+        raise AssertionError(f"{watched.name} keeps {left} vehicles on the road for ever")

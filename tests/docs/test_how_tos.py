@@ -1,4 +1,4 @@
-"""Every block of the tutorial and of every how-to page runs, in its order, in a folder of its own.
+"""Every block of the tutorial, each how-to page and experiment runs, in a folder of its own.
 
 A block after ``<!-- not run: why -->`` is left out. Blocks of shell run under ``bash -e`` with this
 Python's folder first on the path; blocks of Python share one namespace a page.
@@ -14,7 +14,11 @@ from typing import NamedTuple
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "how-to").glob("*.md"))]
+PAGES = [
+    DOCS / "tutorial.md",
+    *sorted((DOCS / "how-to").glob("*.md")),
+    *sorted((DOCS / "experiments").glob("*.md")),
+]
 BLOCK = re.compile(
     r"(?P<skip><!-- not run: (?P<why>[^>]*) -->\n)?^```(?P<kind>\w*)\n(?P<code>.*?)^```$",
     re.MULTILINE | re.DOTALL,

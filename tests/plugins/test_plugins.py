@@ -410,6 +410,23 @@ def test_the_contract_finds_what_breaks_it():
         def decide(self, view, memory):
             return Decision()
 
+    class Braking:
+        name, summary, cooperative, period_s = (
+            "braking",
+            "brings the mainline to a stand",
+            True,
+            0.5,
+        )
+
+        def decide(self, view, memory):
+            if view.subjects:
+                return MainlinePriority().decide(view, memory)
+            fleet = view.fleet
+            rows = [row for row in fleet.live.tolist() if fleet.merge_time_s[row] < view.time_s]
+            return Decision(tuple(DriveWithAcceleration(r, -1.0, 0.5) for r in rows), (), memory)
+
+    with pytest.raises(AssertionError, match=r"braking (leaves|lets|keeps) .*"):
+        check_strategy(Braking, seeds=(1,))
     with pytest.raises(CorampError, match=r"fickle: .* answers the same question differently"):
         check_strategy(Fickle)
     with pytest.raises(AssertionError, match=r"idle leaves .* waiting"):
