@@ -153,6 +153,26 @@ def test_whatever_is_commanded_everyone_keeps_its_distance(situation, seed):
         assert ramp_m.max(initial=-1.0) <= 1e-6
 
 
+@settings(max_examples=30)
+@given(situations(), st.integers(0, 2**32))
+def test_how_much_room_the_book_has_changes_nothing(situation, seed):
+    """The book's first size is that of all arrivals: what depends on it would know the future."""
+    scenario, arrivals, _ = situation
+    histories = []
+    for room in (1, 5000):
+        coordinator = Coordinator(
+            Wild(Random(seed)), scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+        )
+        coordinator.ledger.make_room(room)
+        coordinator.expect_arrivals()
+        coordinator.run(600)
+        histories.append(
+            [(c.row, c.pieces.tolist()) for c in coordinator.ledger.history]
+            + [coordinator.interventions]
+        )
+    assert histories[0] == histories[1]
+
+
 def test_many_commands_make_the_book_grow():
     loop = loop_of(("m", 0.0, 20.0), ("r", 0.0, 16.0))
     for k in range(60):

@@ -65,21 +65,27 @@ def empty_book(rows: int, pieces: int) -> Book:
     )
 
 
-def with_room(book: Book) -> Book:
-    """Returns the book, or one with more room where less than one more commitment fits."""
-    if not is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
-        return book
+def with_room(book: Book, commitments: int = 1) -> Book:
+    """Returns the book, or one with more room where fewer commitments fit than that."""
     rows, pieces = len(book.live), len(book.pieces)
-    larger = empty_book(2 * rows, 2 * pieces + MAX_PIECES)
+    while is_full(book.used, rows, 2 * rows, pieces, commitments):
+        rows, pieces = 2 * rows, 2 * pieces + MAX_PIECES
+    if rows == len(book.live):
+        return book
+    larger = empty_book(rows, pieces)
     for old, new in zip(book, larger, strict=True):
         new[: len(old)] = old
     return larger
 
 
 @kernel
-def is_full(used: IntArray, rows: int, blocks: int, pieces: int) -> bool:
-    """Returns whether so much room may be too little for one more row or commitment."""
-    return bool(used[ROWS] >= rows or used[BLOCKS] >= blocks or used[PIECES] + MAX_PIECES > pieces)
+def is_full(used: IntArray, rows: int, blocks: int, pieces: int, commitments: int = 1) -> bool:
+    """Returns whether so much room may be too little for one more row, or so many commitments."""
+    return bool(
+        used[ROWS] >= rows
+        or used[BLOCKS] + commitments > blocks
+        or used[PIECES] + commitments * MAX_PIECES > pieces
+    )
 
 
 @kernel

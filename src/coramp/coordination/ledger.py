@@ -55,9 +55,9 @@ class Ledger:
             pieces = book.pieces[first : first + book.block_count[block]]
             yield Commitment(int(book.block_row[block]), pieces)
 
-    def make_room(self) -> None:
-        """Makes sure that one more row and commitment fit into the book."""
-        self.book = with_room(self.book)
+    def make_room(self, commitments: int = 1) -> None:
+        """Makes sure that one more row and so many commitments fit into the book."""
+        self.book = with_room(self.book, commitments)
 
     def add(self, length_m: float, on_ramp: bool) -> int:
         """Makes room for a cooperative vehicle that is about to enter; returns its row."""

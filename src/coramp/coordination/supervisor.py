@@ -15,7 +15,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.audit.checker import Change, examine
 from coramp.audit.distances import Bounds
 from coramp.audit.reasons import ACCEPTED
-from coramp.coordination.book import Book, fleet_of, is_full
+from coramp.coordination.book import Book, fleet_of
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
@@ -29,7 +29,6 @@ from coramp.core.trajectory import MAX_PIECES, TIME, cruise_intercept_m, station
 from coramp.strategies.base import DriveWithAcceleration
 from coramp.strategies.situation import foremost_unknown_m
 
-OPEN, DRIVEN = 0, 1
 MOST_PASSES = 3
 """A command that another one stands in the way of is tried again after that."""
 
@@ -46,14 +45,11 @@ def drive_safely(
     rows = np.array([command.row for command in commands], np.int64)
     wishes = np.array([(c.accel_mps2, c.hold_s) for c in commands])
     merges = np.array([command.merge for command in commands], np.bool_)
-    done = np.zeros(len(rows), np.int64)
-    while True:
-        ledger.make_room()
-        finished = drive_all(
-            ledger.book, rows, wishes, merges, done, now_s, fastest_entry_mps, packed_rules, bounds
-        )
-        if finished:
-            return [bool(state == DRIVEN) for state in done.tolist()]
+    ledger.make_room(len(rows))
+    done: BoolArray = drive_all(
+        ledger.book, rows, wishes, merges, now_s, fastest_entry_mps, packed_rules, bounds
+    )
+    return done.tolist()  # type: ignore[no-any-return]
 
 
 @kernel
@@ -62,31 +58,26 @@ def drive_all(
     rows: IntArray,
     wishes: FloatArray,
     merges: BoolArray,
-    done: IntArray,
     now_s: float,
     fastest_entry_mps: float,
     packed_rules: FloatArray,
     bounds: Bounds,
-) -> bool:
-    """Commits what is safe, and notes it in ``done``; False where the book must grow first."""
+) -> BoolArray:
+    """Commits what is safe, and returns what that is; the book has room for all."""
+    done = np.zeros(len(rows), np.bool_)
     rules = unpacked(packed_rules)
     from_s = now_s + rules.control.actuation_delay_s
     known_m = foremost_unknown_m(now_s, fastest_entry_mps, rules)
     for _ in range(MOST_PASSES):
         progress = False
         for k in range(len(rows)):
-            if done[k] != OPEN:
-                continue
-            if is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
-                return False
-            if _drive_one(
+            if not done[k] and _drive_one(
                 book, rows[k], wishes[k, 0], wishes[k, 1], merges[k], from_s, known_m, rules, bounds
             ):
-                done[k] = DRIVEN
-                progress = True
+                done[k] = progress = True
         if not progress:
             break
-    return True
+    return done
 
 
 @kernel
