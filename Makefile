@@ -24,7 +24,6 @@ $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt hatchling editables
 	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
-	@echo "Compiling the kernels, once (about a minute) ..."
 	@$(BIN)/coramp run paper --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
 	@$(BIN)/coramp run paper --strategy ramp-priority --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
 	@touch $(INSTALLED)

@@ -56,6 +56,11 @@ def _cache_directory() -> Path:
     return directory
 
 
+def never_compiled() -> bool:
+    """Returns whether no kernel of this version has ever been compiled here."""
+    return not _cache_directory().exists()
+
+
 def compiling() -> bool:
     """Returns whether a kernel is being compiled now."""
     from numba.core.compiler_lock import global_compiler_lock as untyped_lock

@@ -100,8 +100,9 @@ def plan(
 ) -> None:
     """Plan one given situation and show every quantity with its equation."""
     from coramp.api import plan as plan_snapshot
-    from coramp.console import plan_json, print_json, print_plan
+    from coramp.console import plan_json, print_json, print_plan, tell_of_compiling
 
+    tell_of_compiling()
     result = plan_snapshot(snapshot, strategy)
     if plot is not None:
         from coramp.report.plan_figure import save_plan_figure
@@ -141,9 +142,10 @@ def run(
 ) -> None:
     """Run one scenario."""
     from coramp.api import run as run_scenario
-    from coramp.console import print_json, print_run, working
+    from coramp.console import print_json, print_run, tell_of_compiling, working
     from coramp.toml_files import parse_overrides
 
+    tell_of_compiling()
     with working("running"):
         result = run_scenario(
             scenario,
@@ -197,6 +199,7 @@ def study(
         print_outlook,
         print_study,
         study_json,
+        tell_of_compiling,
     )
 
     if dry_run or status:
@@ -206,6 +209,7 @@ def study(
         else:
             print_outlook(ahead)
         return
+    tell_of_compiling()
     with StudyProgress() as progress:
         result = run_study(
             name,
@@ -297,9 +301,10 @@ def studio(
     show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Play with a scenario: a local page with sliders whose picture follows at once."""
-    from coramp.console import serving
+    from coramp.console import serving, tell_of_compiling
     from coramp.studio.server import serve
 
+    tell_of_compiling()
     serve(scenario, port, lambda address: serving(address, show))
 
 
@@ -323,8 +328,15 @@ def figures(
 ) -> None:
     """Draw the paper's figures and ours, as SVG and PNG; run what they need."""
     from coramp.api import figures as draw_figures
-    from coramp.console import StudyProgress, figures_json, print_figures, print_json
+    from coramp.console import (
+        StudyProgress,
+        figures_json,
+        print_figures,
+        print_json,
+        tell_of_compiling,
+    )
 
+    tell_of_compiling()
     with StudyProgress() as progress:
         result = draw_figures(out, seeds=seeds, jobs=jobs, studies=studies or (), progress=progress)
     if json:

@@ -70,6 +70,14 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
+def tell_of_compiling() -> None:
+    """Says on stderr why the first command of an installation takes so long."""
+    from coramp._kernel import never_compiled
+
+    if never_compiled():
+        print("Compiling the kernels, once (a minute or two) ...", file=sys.stderr)
+
+
 @contextmanager
 def working(text: str) -> Iterator[None]:
     """Shows that something is under way, on a terminal only."""

@@ -2,6 +2,8 @@ import json
 
 import pytest
 
+from coramp import _kernel
+from coramp.console import tell_of_compiling
 from coramp.errors import CorampError
 from coramp.listing import listing
 from coramp.strategies.registry import register, strategies, strategy_named
@@ -59,3 +61,14 @@ def test_names_of_strategies_are_unique_and_known():
 def test_nobody_can_change_the_registry_through_what_it_returns():
     strategies().clear()
     assert strategies()
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_first_command_says_that_kernels_are_compiled(compiled, tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "kernels"
+    if compiled:
+        folder.mkdir()
+    monkeypatch.setattr(_kernel, "_cache_directory", lambda: folder)
+    tell_of_compiling()
+    said = "" if compiled else "Compiling the kernels, once (a minute or two) ...\n"
+    assert capsys.readouterr() == ("", said)
