@@ -8,7 +8,8 @@ from pydantic import ValidationError
 
 from coramp import CorampError
 from coramp.loading import drivers_checked, load_scenario
-from coramp.scenario import Scenario, decision_station_range_m, is_multiple
+from coramp.scenario import Scenario
+from coramp.scenario_checks import decision_station_range_m, is_multiple
 from coramp.toml_files import builtin_names, parse_overrides, with_overrides
 from tests.edges import built_in, edited
 

@@ -10,7 +10,8 @@ from coramp.errors import CorampError
 from coramp.loading import load_scenario
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, make_spec
-from coramp.scenario import Scenario, decision_station_range_m
+from coramp.scenario import Scenario
+from coramp.scenario_checks import decision_station_range_m
 from coramp.strategies.registry import strategies
 
 NOTHING = "nothing"
