@@ -300,7 +300,7 @@ def test_a_run_that_kills_its_process_fails_alone(monkeypatch):
         "deadly": "failed",
         good.run_id: "ok",
     }
-    assert store.written["deadly"].run["error"].endswith(": the process that ran it died")
+    assert store.written["deadly"].run["error"] == ("strategy deadly: the process that ran it died")
 
 
 LONG_GRID = GRID.replace("horizon_s = 20.0", "horizon_s = 120.0").replace("seeds = 2", "seeds = 3")

@@ -143,7 +143,7 @@ def _results(specs: Sequence[RunSpec], jobs: int) -> Results:
         try:
             (part,) = _in_workers([spec], max(2, jobs) if jobs != ALL_WORKERS else jobs)
         except TerminatedWorkerError:
-            died = f"strategy {spec.strategy}: the process that ran it died"
+            died = f"strategy {spec.keys['strategy']}: the process that ran it died"
             part = Part(failed_row(spec, died, 0.0), [])
         yield spec, part
 
