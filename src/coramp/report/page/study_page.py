@@ -1,6 +1,6 @@
 """The report of a study: its answer, its tables and pictures, and what it does not know."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import polars as pl
@@ -117,20 +117,32 @@ def _asked(study: Study, good: pl.DataFrame) -> Table:
 
 
 def _answer(good: pl.DataFrame) -> str:
-    """What each strategy loses at the highest flow that all share, in a sentence."""
+    """What each strategy loses at the highest flow that all share, in a sentence.
+
+    Strategies with the same figures are named together.
+    """
     mainline, ramp = _shared_flows(good)[-1]
     at = _plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
     main = at.filter(pl.col("drivers").is_null() | pl.col("drivers").is_in(SHOWN_DRIVERS))
     at = main if main.height else at
-    parts = []
+    losing: dict[tuple[str, ...], list[str]] = {}
     for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
-        delays = [
+        delays = tuple(
             with_interval(estimate(group[f"{stream}_delay_s"].drop_nulls().to_list()))
             for stream in ("mainline", "ramp")
-        ]
+        )
         name = look_of(str(strategy), str(drivers) if drivers else None).label
-        parts.append(f"{name} loses {delays[0]} s on the mainline and {delays[1]} s on the ramp")
+        losing.setdefault(delays, []).append(name)
+    parts = [
+        f"{_lose(names)} {mainline_s} s on the mainline and {ramp_s} s on the ramp"
+        for (mainline_s, ramp_s), names in losing.items()
+    ]
     return f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals: {'; '.join(parts)}."
+
+
+def _lose(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last} each lose" if others else f"{last} loses"
 
 
 def _plain(good: pl.DataFrame) -> pl.DataFrame:
