@@ -28,13 +28,13 @@ class Barriers(NamedTuple):
     """What a vehicle's barriers to one predecessor ask of its own acceleration, one entry each.
 
     ``ahead`` is the predecessor's entry, -1 for none. With u in m/s2 on the own road:
-    ``weight u <= allowed_mps + from_ahead(u_p)``, a row of arrays for the distance at speed and one
-    for the distance to stop in (``Ocbf.highest_mps2``). Speeds and bounds of the acceleration of
-    the predecessor are those of the place at which it counts.
+    ``weight u <= allowed_mps`` and what the predecessor's u adds (``Ocbf.highest_mps2``), once for
+    the distance at speed and once for the distance to stop in. ``ahead_mps`` is the speed of the
+    place at which the predecessor counts, which moves ``ahead_scale`` times as fast as it, and
+    ``hardest_mps2`` the own hardest braking there.
     """
 
     ahead: IntArray
-    scale: FloatArray
     ahead_scale: FloatArray
     ahead_mps: FloatArray
     hardest_mps2: FloatArray
@@ -234,7 +234,6 @@ class Ocbf:
         rest = v_p - v - growing
         return Barriers(
             ahead,
-            scale,
             scale[ahead],
             v_p,
             down,
