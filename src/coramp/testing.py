@@ -16,6 +16,7 @@ from coramp.strategies.base import (
     Memory,
     Strategy,
     View,
+    entry_policy_of,
     is_metered,
     period_of,
 )
@@ -35,6 +36,7 @@ class Twice:
         self.name, self.cooperative = strategy.name, strategy.cooperative
         self.period_s = period_of(strategy())
         self.metered = is_metered(strategy())
+        self.entry_policy = entry_policy_of(strategy())
         self.asked = 0
         self._strategy = strategy
 

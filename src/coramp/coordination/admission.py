@@ -42,16 +42,21 @@ def plan_entry(
     time_s: float,
     station_m: float,
     speed_mps: float,
+    slowest_mps: float,
     rules: Rules,
 ) -> FloatArray:
     """Returns the trajectory with which a vehicle enters now, of length 0 if it must wait.
 
-    It brakes for the least whole number of steps that is safe.
+    It brakes for the least whole number of steps that is safe, but not below ``slowest_mps``; at 0
+    it may come to a stand.
     """
     out = np.empty((MAX_PIECES, 4))
     stop_m = stop_behind_m(fleet, rules) if on_ramp else math.inf
     step_s = rules.control.step_s
     most = math.ceil(speed_mps / rules.motion.slow_down_mps2 / step_s)
+    if slowest_mps > 0.0:
+        spare_mps = max(0.0, speed_mps - slowest_mps)
+        most = math.floor(spare_mps / rules.motion.slow_down_mps2 / step_s)
     too_short, enough, steps = -1, most + 1, 0
     while enough - too_short > 1:
         n = entry_with_brake(

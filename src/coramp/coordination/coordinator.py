@@ -24,13 +24,16 @@ from coramp.coordination.gate import (
     WAITS,
     admit_until,
     enter,
+    entries_of,
     first_step_from,
     gate_for,
     open_gate,
+    waiting_at,
 )
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.plant import Arrival, Plant
 from coramp.coordination.supervisor import drive_safely
+from coramp.core.approach import stop_starts_s
 from coramp.core.fleet import proposed
 from coramp.core.rules import Rules, packed
 from coramp.core.trajectory import station_and_speed
@@ -42,6 +45,7 @@ from coramp.strategies.base import (
     FollowTrajectory,
     Memory,
     View,
+    entry_policy_of,
     period_of,
     steps_of_period,
 )
@@ -97,14 +101,17 @@ class Coordinator:
         self._packed = packed(rules)
         self._examiner = Examiner(bounds_of(rules))
         self._arrivals = arrivals
-        self._gate = gate_for(arrivals)
+        policy = entry_policy_of(strategy)
+        self._asks_at_entry = policy.asked
+        slowest_mps = policy.slowest_share * road.mainline_speed_mps
+        self._gate = gate_for(arrivals, policy.asked, slowest_mps)
         self._fastest_entry_mps = fastest_entry_mps
         self._plant = plant
         self._memory: Memory = None
         self._step_s = rules.control.step_s
         self._due_step: dict[int, int] = {}
         self._wakes: list[tuple[int, int, int]] = []
-        self._announced = 0
+        self._announced = self._told_of_entries = 0
         period_s = period_of(strategy)
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
@@ -146,6 +153,11 @@ class Coordinator:
         new = slice(self._announced, len(self.ledger))
         self._announced, first_due = new.stop, NEVER
         self._tell_plant(new)
+        if self._asks_at_entry:
+            for row in range(new.start, new.stop):
+                step = int(self._gate.row_step[row])
+                self._wake(step, row)
+                first_due = min(first_due, step)
         for row, due in enumerate(self._gate.row_due_step[new].tolist(), new.start):
             if due != NEVER:
                 self._due_step[row] = due
@@ -185,9 +197,25 @@ class Coordinator:
             if len(self.ledger.fleet.live):
                 self._decide((), step)
         while subjects := self._woken(step):
-            ready = tuple(row for row in subjects if not self._goes_on_to_station(row, step))
+            ready = self._ready(subjects, step)
             if ready:
                 self._decide(ready, step)
+
+    def _ready(self, subjects: tuple[int, ...], step: int) -> tuple[int, ...]:
+        """Who is to be planned now: all, but for those who can go on to their station first.
+
+        A strategy that is asked at entries plans vehicles before that, and so is asked about all.
+        """
+        if not self._asks_at_entry:
+            return tuple(row for row in subjects if not self._goes_on_to_station(row, step))
+        for row in subjects:
+            self._moves_up_in_time(row, step, step)
+        return subjects
+
+    def _moves_up_in_time(self, row: int, step: int, before_step: int) -> None:
+        """Moves a vehicle up whose stop would begin before a step, if it can."""
+        if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
+            self._moves_up(row, step)
 
     def _woken(self, step: int) -> tuple[int, ...]:
         rows: dict[int, None] = {}
@@ -267,6 +295,7 @@ class Coordinator:
         """Returns what is known at a step."""
         time_s = step * self._step_s
         fleet = self.ledger.fleet
+        entered = range(self._told_of_entries, len(self.ledger))
         return View(
             time_s,
             subjects,
@@ -276,10 +305,15 @@ class Coordinator:
             self._fastest_entry_mps,
             self._rules,
             self._packed,
+            None,
+            partial(entries_of, self._gate, entered, self._step_s),
+            partial(waiting_at, self._gate, step, self._step_s),
         )
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
-        decision = self._strategy.decide(self.view(subjects, step), self._memory)
+        view = self.view(subjects, step)
+        self._told_of_entries = len(self.ledger)
+        decision = self._strategy.decide(view, self._memory)
         self.carry_out(decision, subjects, step)
 
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
@@ -305,7 +339,9 @@ class Coordinator:
         for wake_s, row in decision.wakes_s:
             wake_step = first_step_from(wake_s, self._step_s)
             self._wake(wake_step, row)
-            if wake_step > step:
+            if self._asks_at_entry:
+                self._moves_up_in_time(row, step, wake_step)
+            elif wake_step > step:
                 self._moves_up(row, step)
 
     def drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> int:

@@ -42,17 +42,22 @@ class Examiner:
 
     def __init__(self, bounds: Bounds) -> None:
         self.bounds = bounds
-        self._rows = np.zeros(MAX_CHANGED, np.int64)
-        self._count = np.zeros(MAX_CHANGED, np.int64)
-        self._pieces = np.zeros((MAX_CHANGED, MAX_PIECES, 4))
-        self._merge_s = np.zeros(MAX_CHANGED)
-        self._start = np.zeros((MAX_CHANGED, 3))
-        self._makes_gap = np.zeros(MAX_CHANGED, np.int64)
+        self._make_room(MAX_CHANGED)
+
+    def _make_room(self, changes: int) -> None:
+        self._rows = np.zeros(changes, np.int64)
+        self._count = np.zeros(changes, np.int64)
+        self._pieces = np.zeros((changes, MAX_PIECES, 4))
+        self._merge_s = np.zeros(changes)
+        self._start = np.zeros((changes, 3))
+        self._makes_gap = np.zeros(changes, np.int64)
 
     def change(
         self, ledger: Ledger, commands: Sequence[FollowTrajectory], earliest_s: float
     ) -> Verdict:
         """Returns the verdict on trajectories that take over from what is committed."""
+        if len(commands) > len(self._rows):
+            self._make_room(2 * len(commands))
         for k, command in enumerate(commands):
             start_s = command.pieces[0, 0]
             station_m, speed_mps = station_and_speed(ledger.trajectory(command.row), start_s)

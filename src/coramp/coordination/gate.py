@@ -17,6 +17,7 @@ from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_ful
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
 from coramp.core.rules import Rules, unpacked
+from coramp.strategies.base import Entered, Waiting
 
 NEVER = 1 << 60
 WAITS = -1
@@ -30,6 +31,8 @@ class Gate(NamedTuple):
     ``of_stream[s]`` lists the ``vehicles[s]`` arrivals of a stream; ``next_place[s]`` is the place
     of the first that has not entered, and ``try_step[s]`` when that tries. ``row_*`` have an entry
     a row of the book: its arrival, the step at which it entered, the one at which it is planned.
+    ``asks`` is True where the strategy is asked about each vehicle as it enters. A mainline vehicle
+    waits outside rather than brake below ``slowest_mps`` as it enters. Both have one entry.
     """
 
     step: IntArray
@@ -43,6 +46,8 @@ class Gate(NamedTuple):
     row_arrival: IntArray
     row_step: IntArray
     row_due_step: IntArray
+    asks: BoolArray
+    slowest_mps: FloatArray
 
 
 class Stop(NamedTuple):
@@ -54,7 +59,9 @@ class Stop(NamedTuple):
     code: int
 
 
-def gate_for(arrivals: Sequence[Arrival]) -> Gate:
+def gate_for(
+    arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0
+) -> Gate:
     """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
     on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
     streams = [np.flatnonzero(~on_ramp), np.flatnonzero(on_ramp)]
@@ -73,6 +80,30 @@ def gate_for(arrivals: Sequence[Arrival]) -> Gate:
         np.zeros(len(arrivals), np.int64),
         np.zeros(len(arrivals), np.int64),
         np.full(len(arrivals), NEVER),
+        np.array([asks]),
+        np.array([slowest_mps]),
+    )
+
+
+def entries_of(gate: Gate, rows: range, step_s: float) -> tuple[Entered, ...]:
+    """Returns the entries of these rows of the book."""
+    arrivals = gate.row_arrival[rows.start : rows.stop]
+    return tuple(
+        Entered(row, bool(gate.on_ramp[k]), int(gate.row_step[row]) * step_s, gate.step[k] * step_s)
+        for row, k in zip(rows, arrivals.tolist(), strict=True)
+    )
+
+
+def waiting_at(gate: Gate, step: int, step_s: float) -> Waiting:
+    """Returns who has come by ``step`` and not entered."""
+    left = [
+        gate.of_stream[stream, gate.next_place[stream] : gate.vehicles[stream]]
+        for stream in range(2)
+    ]
+    came = [numbers[: np.searchsorted(gate.step[numbers], step, "right")] for numbers in left]
+    numbers = np.concatenate(came)
+    return Waiting(
+        numbers, gate.on_ramp[numbers], gate.step[numbers] * step_s, gate.length_m[numbers]
     )
 
 
@@ -118,6 +149,8 @@ def admit_until(
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
                     last_step = min(last_step, gate.row_due_step[book.used[ROWS] - 1])
+                    if gate.asks[0]:
+                        last_step = min(last_step, step)
                 else:
                     gate.try_step[stream] = step + 1
                     if code != WAITS:
@@ -140,7 +173,16 @@ def enter(
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     length_m, speed_mps = gate.length_m[arrival], gate.speed_mps[arrival]
-    pieces = plan_entry(fleet_of(book), length_m, on_ramp, time_s, station_m, speed_mps, rules)
+    pieces = plan_entry(
+        fleet_of(book),
+        length_m,
+        on_ramp,
+        time_s,
+        station_m,
+        speed_mps,
+        0.0 if on_ramp else gate.slowest_mps[0],
+        rules,
+    )
     if len(pieces) == 0:
         return WAITS
     row = add_row(book, length_m, on_ramp)

@@ -19,6 +19,7 @@ from coramp.strategies.base import (
     ReleaseToDriver,
     SetRampSignal,
     View,
+    entry_policy_of,
     is_metered,
     period_of,
 )
@@ -48,6 +49,7 @@ class Guarded:
         self.name = strategy.name
         self.period_s = _period_checked(strategy)
         self.metered = is_metered(strategy)
+        self.entry_policy = entry_policy_of(strategy)
         self._strategy = strategy
         self._longest_s = longest_s
         self._time_s = -1.0

@@ -3,7 +3,15 @@
 import time
 from statistics import quantiles
 
-from coramp.strategies.base import Decider, Decision, Memory, View, is_metered, period_of
+from coramp.strategies.base import (
+    Decider,
+    Decision,
+    Memory,
+    View,
+    entry_policy_of,
+    is_metered,
+    period_of,
+)
 
 
 class Timed:
@@ -12,6 +20,7 @@ class Timed:
     def __init__(self, strategy: Decider) -> None:
         self.period_s = period_of(strategy)
         self.metered = is_metered(strategy)
+        self.entry_policy = entry_policy_of(strategy)
         self._strategy = strategy
         self._taken_s: list[float] = []
 

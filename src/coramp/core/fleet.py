@@ -48,19 +48,25 @@ class Proposal(NamedTuple):
 ROUNDING_M = 1e-10
 """What rounding may take from a distance before a planner calls it too small."""
 MAX_CHANGED = 32
-"""Vehicles that one decision may change; a cascade that needs more is given up."""
+"""Vehicles that a cascade may change; one that needs more is given up."""
 
 
 @kernel
-def empty_proposal() -> Proposal:
-    """Returns a proposal that changes nothing, with room for ``MAX_CHANGED`` vehicles."""
+def empty_proposal(room: int = MAX_CHANGED) -> Proposal:
+    """Returns a proposal that changes nothing, with room for so many vehicles."""
     return Proposal(
         np.zeros(1, np.int64),
-        np.empty(MAX_CHANGED, np.int64),
-        np.empty(MAX_CHANGED, np.int64),
-        np.empty((MAX_CHANGED, MAX_PIECES, 4)),
-        np.empty(MAX_CHANGED),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.empty((room, MAX_PIECES, 4)),
+        np.empty(room),
     )
+
+
+@kernel
+def is_full(proposal: Proposal) -> bool:
+    """Returns whether the proposal has no room for another vehicle."""
+    return bool(proposal.size[0] >= len(proposal.rows))
 
 
 @kernel

@@ -8,11 +8,11 @@ import math
 from coramp._kernel import FloatArray, kernel
 from coramp.core.approach import append_stop, approach_without_stop, harmonise
 from coramp.core.fleet import (
-    MAX_CHANGED,
     ROUNDING_M,
     Fleet,
     Proposal,
     committed,
+    is_full,
     merge_time_under_s,
     pair_margin_m,
     trajectory_under,
@@ -31,7 +31,7 @@ def propose_stop(
     the ramp. Returns False, and adds nothing, where none is enough or the stop is too near.
     """
     entry = proposal.size[0]
-    if entry >= MAX_CHANGED:
+    if is_full(proposal):
         return False
     before = committed(fleet, row)
     station_m, speed_mps = station_and_speed(before, from_s)
@@ -63,7 +63,7 @@ def propose_place_ahead(
     before that. Returns False, and adds nothing, where neither is safe.
     """
     entry = proposal.size[0]
-    if entry >= MAX_CHANGED:
+    if is_full(proposal):
         return False
     before = committed(fleet, row)
     out = proposal.pieces[entry]

@@ -5,12 +5,15 @@ to be woken and, if it has a ``period_s``, once in each such period, then withou
 answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple, Protocol
 
-from coramp._kernel import FloatArray
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.core.fleet import Fleet
 from coramp.core.rules import Rules
 
@@ -42,6 +45,36 @@ class Detectors:
     passed_veh: int
 
 
+@dataclass(frozen=True, slots=True)
+class Entered:
+    """A vehicle that has entered: its row, its stream, when, and since when it wanted to (s)."""
+
+    row: int
+    on_ramp: bool
+    time_s: float
+    since_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Who waits outside to enter, by stream and then by time; one entry a vehicle.
+
+    ``vehicle`` is its number among all arrivals, ``since_s`` when it came.
+    """
+
+    vehicle: IntArray
+    on_ramp: BoolArray
+    since_s: FloatArray
+    length_m: FloatArray
+
+    def first_since_s(self, on_ramp: bool) -> float:
+        """Returns since when (s) the first vehicle of a stream waits, infinity if none does."""
+        return float(self.since_s[self.on_ramp == on_ramp].min(initial=math.inf))
+
+
+NOBODY_WAITS = Waiting(np.empty(0, np.int64), np.empty(0, np.bool_), np.empty(0), np.empty(0))
+
+
 @dataclass(frozen=True)
 class View:
     """What the coordinator knows at ``time_s``: who has entered, and what they have committed to.
@@ -50,7 +83,8 @@ class View:
     their decision stations. ``acknowledged`` holds the commitments that vehicles have confirmed;
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
     which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
-    ``reports``. ``packed_rules`` are the rules as kernels take them (``core.rules``).
+    ``reports``; ``ask_entered`` who has entered since the strategy was last asked, for ``entered``;
+    ``ask_waiting`` who waits outside, for ``waiting``. ``packed_rules`` are the rules as kernels take them (``core.rules``).
     ``detectors`` is None where the road has none. A strategy must not write into any of the arrays.
     """
 
@@ -63,11 +97,23 @@ class View:
     rules: Rules
     packed_rules: FloatArray
     detectors: Detectors | None = None
+    ask_entered: Callable[[], tuple[Entered, ...]] = tuple
+    ask_waiting: Callable[[], Waiting] = lambda: NOBODY_WAITS
 
     @cached_property
     def reports(self) -> Reports:
         """The last reports of all live vehicles."""
         return self.ask_reports()
+
+    @cached_property
+    def entered(self) -> tuple[Entered, ...]:
+        """Who has entered since the strategy was last asked, in order of entry."""
+        return self.ask_entered()
+
+    @cached_property
+    def waiting(self) -> Waiting:
+        """Who waits outside to enter."""
+        return self.ask_waiting()
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +220,29 @@ class Decider(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class EntryPolicy:
+    """What a strategy asks of the entries of vehicles.
+
+    ``asked``: it is asked about every vehicle as that enters, with the vehicle as the subject.
+    ``holds_newcomers``: its merges may stand in the way of mainline vehicles that are yet to enter;
+    these brake as they enter, or wait outside until they can enter safely. Without it a merge that
+    would bother one of them is refused. ``slowest_share``: no mainline vehicle brakes below this
+    share of v0 as it enters; it waits outside instead.
+    """
+
+    asked: bool = False
+    holds_newcomers: bool = False
+    slowest_share: float = 0.0
+
+
 class Strategy(Decider, Protocol):
     """Who yields to whom.
 
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
     by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
-    for one that needs a signal and detectors on the ramp, in SUMO. One whose parameters must fit
+    for one that needs a signal and detectors on the ramp, in SUMO. ``entry_policy`` is what it
+    asks of entries, if anything: see ``entry_policy_of``. One whose parameters must fit
     together has a method ``problems()``, which returns lines ``parameter: what is wrong; what is
     allowed``.
     """
@@ -192,6 +255,12 @@ class Strategy(Decider, Protocol):
 def period_of(strategy: Decider) -> float | None:
     """Returns in which period (s) a strategy is woken besides, None for one that only plans."""
     return getattr(strategy, "period_s", None)
+
+
+def entry_policy_of(strategy: Decider) -> EntryPolicy:
+    """Returns what a strategy asks of the entries of vehicles."""
+    policy = getattr(strategy, "entry_policy", None)
+    return policy if isinstance(policy, EntryPolicy) else EntryPolicy()
 
 
 def steps_of_period(period_s: float, step_s: float) -> int:

@@ -16,6 +16,7 @@ from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.milp_sequence import MilpSequence
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.ramp_priority import RampPriority
+from coramp.strategies.slots import Slots
 from coramp.strategies.uncontrolled import Uncontrolled
 from coramp.strategies.virtual_platoon import VirtualPlatoon
 
@@ -53,6 +54,7 @@ _OURS: tuple[type[Strategy], ...] = (
     Game,
     VirtualPlatoon,
     Ocbf,
+    Slots,
     Alinea,
     Uncontrolled,
 )
