@@ -34,6 +34,7 @@ from coramp.core.trajectory import (
     clip_end,
     clip_start,
     cruise_intercept_m,
+    drive_to_speed,
     station_and_speed,
     time_at_station,
 )
@@ -49,7 +50,6 @@ from coramp.strategies.situation import (
     assess,
     bounds_between_m,
     conflict_position,
-    gap_of_free_movement,
     ramp_neighbours,
 )
 
@@ -63,6 +63,9 @@ END_SHARES = (0.85, 0.7, 0.55, 0.4, 0.25)
 """Earlier ends of the slower cruise that are tried, as shares of the time to the latest."""
 HALVINGS = 3
 SAME_MPS = 1e-6
+NOSES = ((0.0, 0.0), (0.0, 0.1), (0.0, 0.25), (0.0, 0.5), (0.0, 1.0), (1.0, 0.0), (1.0, 0.5))
+"""How the nose is passed: how far from the ramp's speed to its limit, and after it, how far from
+free movement's acceleration to the largest."""
 
 
 @kernel
@@ -207,33 +210,44 @@ def ends_safely(
     station_m, speed_mps = station_and_speed(committed(fleet, row), from_s)
     v0, motion = rules.road.mainline_speed_mps, rules.motion
     out = proposal.pieces[0]
-    n = slow_phase(
-        out,
-        from_s,
-        station_m,
-        speed_mps,
-        end_s,
-        slot_m,
-        v0,
-        motion.slow_down_mps2,
-        motion.speed_up_mps2,
-    )
-    if n == 0 or out[:n, SPEED].min() < min(speed_mps, slowest_share * v0):
-        return False
-    proposal.size[0], proposal.rows[0], proposal.piece_count[0] = 1, row, n
-    proposal.merge_time_s[0] = -math.inf
-    unsafe, _ = find_unsafe_pair(fleet, proposal, from_s, rules)
-    return bool(unsafe < 0)
+    lowest_mps = min(speed_mps, slowest_share * v0)
+    for rise_first in (True, False):
+        n = begin(out, from_s, station_m, speed_mps)
+        if rise_first:
+            if speed_mps >= v0:
+                continue
+            n = drive_to_speed(out, n, motion.speed_up_mps2, v0)
+        more = slow_phase(
+            out[n - 1 :],
+            out[n - 1, TIME],
+            out[n - 1, STATION],
+            out[n - 1, SPEED],
+            end_s,
+            slot_m,
+            v0,
+            motion.slow_down_mps2,
+            motion.speed_up_mps2,
+        )
+        n += more - 1
+        if more == 0 or out[:n, SPEED].min() < lowest_mps:
+            continue
+        proposal.size[0], proposal.rows[0], proposal.piece_count[0] = 1, row, n
+        proposal.merge_time_s[0] = -math.inf
+        unsafe, _ = find_unsafe_pair(fleet, proposal, from_s, rules)
+        if unsafe < 0:
+            return True
+    return False
 
 
 @kernel
 def plan_onto_lane(
-    fleet: Fleet, row: int, now_s: float, packed_rules: FloatArray
+    fleet: Fleet, row: int, now_s: float, claim_s: float, packed_rules: FloatArray
 ) -> tuple[MergePlan, Proposal, bool, int]:
     """Returns a ramp vehicle's plan into the first slot that it can take, and its trajectories.
 
-    The slots tried lie in the gaps of the lane order, from the one of free movement backwards. The
-    rest is what ``ramp_neighbours`` tells.
+    The slots tried lie in the gaps of the lane order, from its earliest backwards: that of free
+    movement or, for a vehicle that was held up, one nearer to the crossing time ``claim_s`` that it
+    would have had. The rest is what ``ramp_neighbours`` tells.
     """
     rules = unpacked(packed_rules)
     proposal = empty_proposal(ROOM)
@@ -242,7 +256,8 @@ def plan_onto_lane(
     conflict = conflict_position(fleet, situation, rules)
     merge = no_merge()
     if not blocked:
-        merge = first_slot(fleet, proposal, situation, rules)
+        earliest_m = earliest_slot_m(fleet, situation, claim_s, rules)
+        merge = first_slot(fleet, proposal, situation, earliest_m, rules)
     rung = RUNG_HOLD
     if merge.gap >= 0:
         rung = RUNG_DELAY
@@ -253,15 +268,39 @@ def plan_onto_lane(
 
 
 @kernel
-def first_slot(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> Merge:
+def earliest_slot_m(fleet: Fleet, situation: Situation, claim_s: float, rules: Rules) -> float:
+    """Returns the foremost intercept (m) that the subject may take.
+
+    A vehicle that was held up makes up for it at the ramp's limit and with the largest acceleration
+    behind the nose, but is never before its claim.
+    """
+    road, motion = rules.road, rules.motion
+    station_m, speed_mps = station_and_speed(
+        committed(fleet, situation.subject), situation.from_s
+    )
+    out = np.empty((MAX_PIECES, 4))
+    n = begin(out, situation.from_s, station_m, speed_mps)
+    n = change_speed(out, n, road.ramp_limit_mps, motion)
+    n = clip_end(out, n, time_at_station(out[:n], 0.0))
+    v0 = road.mainline_speed_mps
+    fastest_m = -v0 * out[n - 1, TIME] - lag_m(
+        v0, out[n - 1, SPEED], motion.ramp_acceleration_mps2
+    )
+    return max(situation.free_m, min(fastest_m, -v0 * claim_s))
+
+
+@kernel
+def first_slot(
+    fleet: Fleet, proposal: Proposal, situation: Situation, earliest_m: float, rules: Rules
+) -> Merge:
     """Proposes the first slot that the subject can take; ``gap`` is -1 where there is none."""
     order, intercepts_m = situation.order, situation.intercepts_m
     own_m = fleet.length_m[situation.subject] + situation.clearance_m
-    for gap in range(gap_of_free_movement(situation), len(order) + 1):
+    for gap in range(len(order) + 1):
         low_m, high_m = bounds_between_m(
             order, intercepts_m, fleet.length_m, gap, -math.inf, own_m, situation.clearance_m
         )
-        first_m = min(high_m, situation.free_m)
+        first_m = min(high_m, earliest_m)
         if first_m < low_m:
             continue
         tried_m = -1.0
@@ -315,19 +354,21 @@ def merge_in_slot(
     After a slower cruise the nose is passed at the ramp's speed; higher accelerations behind it are
     tried as well, since they put the subject further behind its leader on the ramp.
     """
-    motion = rules.motion
+    road, motion = rules.road, rules.motion
     free, most = situation.free_accel_mps2, motion.ramp_acceleration_mps2
     lag_behind_m = situation.free_m - slot_m
     way = np.empty((MAX_PIECES, 4))
-    if lag_behind_m < KEEP_M and merges_safely(
+    if abs(lag_behind_m) < KEEP_M and merges_safely(
         fleet, proposal, situation, situation.approach, free, rules
     ):
         return merge_of(proposal, gap, free, max(0.0, lag_behind_m))
     regained_s = leader_regains_s(fleet, situation, rules)
-    for share in (0.0, 0.1, 0.25, 0.5, 1.0):
+    for nose_mps, share in NOSES:
         accel_mps2 = free + share * (most - free)
-        lag = lag_m(rules.road.mainline_speed_mps, rules.road.ramp_speed_mps, accel_mps2)
-        nose_s = -(slot_m + lag) / rules.road.mainline_speed_mps
+        nose_mps = road.ramp_speed_mps + nose_mps * (road.ramp_limit_mps - road.ramp_speed_mps)
+        nose_s = -(slot_m + lag_m(road.mainline_speed_mps, nose_mps, accel_mps2)) / (
+            road.mainline_speed_mps
+        )
         for end_s in (
             nose_s,
             regained_s + rules.safety.time_gap_s,
@@ -336,7 +377,7 @@ def merge_in_slot(
         ):
             if not situation.from_s < end_s <= nose_s:
                 continue
-            n = slow_on_ramp(fleet, situation, nose_s, end_s, way, rules)
+            n = slow_on_ramp(fleet, situation, nose_s, nose_mps, end_s, way, rules)
             if n > 0 and merges_safely(fleet, proposal, situation, way[:n], accel_mps2, rules):
                 return merge_of(proposal, gap, accel_mps2, lag_behind_m)
     n, accel_mps2 = leave_stop_for_slot(fleet, situation, slot_m, way, rules)
@@ -373,16 +414,17 @@ def slow_on_ramp(
     fleet: Fleet,
     situation: Situation,
     nose_s: float,
+    nose_mps: float,
     end_s: float,
     out: FloatArray,
     rules: Rules,
 ) -> int:
-    """Writes the approach that passes the nose at ``nose_s`` with the ramp's speed.
+    """Writes the approach that passes the nose at ``nose_s`` with ``nose_mps``.
 
     It goes to a slower speed at once and is back by ``end_s``. Returns 0 where that asks for less
     than ``slowest_ramp_speed_mps``.
     """
-    ramp_mps, motion = rules.road.ramp_speed_mps, rules.motion
+    motion = rules.motion
     station_m, speed_mps = station_and_speed(
         committed(fleet, situation.subject), situation.from_s
     )
@@ -392,8 +434,8 @@ def slow_on_ramp(
         station_m,
         speed_mps,
         end_s,
-        -ramp_mps * nose_s,
-        ramp_mps,
+        -nose_mps * nose_s,
+        nose_mps,
         motion.slow_down_mps2,
         motion.speed_up_mps2,
     )

@@ -78,7 +78,7 @@ class Slots:
         if not self._goes_now(view, claim_s, ahead_s):
             return Decision((), (*rest, (view.time_s + view.rules.control.retry_s, row)), waits)
         plan, proposal, blocked, behind = plan_onto_lane(
-            view.fleet, row, view.time_s, view.packed_rules
+            view.fleet, row, view.time_s, claim_s, view.packed_rules
         )
         if blocked or plan.rung == RUNG_HOLD:
             again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
