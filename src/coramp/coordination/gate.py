@@ -96,15 +96,29 @@ def entries_of(gate: Gate, rows: range, step_s: float) -> tuple[Entered, ...]:
 
 def waiting_at(gate: Gate, step: int, step_s: float) -> Waiting:
     """Returns who has come by ``step`` and not entered."""
-    left = [
-        gate.of_stream[stream, gate.next_place[stream] : gate.vehicles[stream]]
-        for stream in range(2)
-    ]
-    came = [numbers[: np.searchsorted(gate.step[numbers], step, "right")] for numbers in left]
-    numbers = np.concatenate(came)
-    return Waiting(
-        numbers, gate.on_ramp[numbers], gate.step[numbers] * step_s, gate.length_m[numbers]
-    )
+    return Waiting(*_waiting_at(gate, step, step_s))
+
+
+@kernel
+def _waiting_at(
+    gate: Gate, step: int, step_s: float
+) -> tuple[IntArray, BoolArray, FloatArray, FloatArray]:
+    """Returns the fields of ``Waiting``."""
+    counts = np.zeros(2, np.int64)
+    for stream in range(2):
+        place = gate.next_place[stream]
+        while (
+            place + counts[stream] < gate.vehicles[stream]
+            and gate.step[gate.of_stream[stream, place + counts[stream]]] <= step
+        ):
+            counts[stream] += 1
+    numbers = np.empty(counts.sum(), np.int64)
+    for stream in range(2):
+        place, start = gate.next_place[stream], counts[0] * stream
+        numbers[start : start + counts[stream]] = gate.of_stream[
+            stream, place : place + counts[stream]
+        ]
+    return numbers, gate.on_ramp[numbers], gate.step[numbers] * step_s, gate.length_m[numbers]
 
 
 @kernel

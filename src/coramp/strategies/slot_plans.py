@@ -34,6 +34,7 @@ from coramp.core.trajectory import (
     clip_end,
     clip_start,
     cruise_intercept_m,
+    drive,
     drive_to_speed,
     station_and_speed,
     time_at_station,
@@ -53,6 +54,11 @@ from coramp.strategies.situation import (
     ramp_neighbours,
 )
 
+SLOWEST_SHARE = 0.5
+"""Of v0: what a slower cruise on the mainline does not go below."""
+CRUISE_SHARES = (1.0, 0.3, 0.001, 0.0)
+"""Of the time there is, how much of it is tried for a slower cruise; 0 goes to it at once."""
+SHORTEST_CRUISE_S = 0.1
 ROOM = 128
 """Vehicles that a plan may change: the subject and those behind it on the ramp."""
 KEEP_M = 1e-3
@@ -70,12 +76,13 @@ free movement's acceleration to the largest."""
 
 @kernel
 def plan_in_lane(
-    fleet: Fleet, row: int, now_s: float, slowest_share: float, packed_rules: FloatArray
+    fleet: Fleet, row: int, now_s: float, clears: bool, packed_rules: FloatArray
 ) -> tuple[FloatArray, float]:
     """Returns the pieces into the slot of a mainline vehicle that has just entered, and its lag.
 
     None, an array of length 0, where it keeps the way on which it entered: that is safe, and where
     nothing better is found it is what is left. The lag (m) is what the plan loses to free movement.
+    With ``clears`` others wait to enter behind it, and it speeds up at once as hard as is comfortable.
     """
     rules = unpacked(packed_rules)
     road, motion = rules.road, rules.motion
@@ -87,7 +94,7 @@ def plan_in_lane(
     n = begin(out, from_s, station_m, speed_mps)
     n = change_speed(out, n, v0, motion)
     free_m, entry_m = cruise_intercept_m(out[:n], v0), cruise_intercept_m(entry, v0)
-    if free_m - entry_m < KEEP_M:
+    if free_m - entry_m < KEEP_M and not clears:
         return out[:0], 0.0
     slot_m, leader = slot_behind_m(fleet, row, entry_m, from_s, rules)
     slot_m = min(slot_m, free_m)
@@ -97,7 +104,7 @@ def plan_in_lane(
         if slot_m - setback_m < entry_m - KEEP_M:
             break
         n = slow_down_to_slot(
-            fleet, proposal, row, leader, from_s, slot_m - setback_m, slowest_share, rules
+            fleet, proposal, row, leader, from_s, slot_m - setback_m, clears, rules
         )
         if n > 0:
             found_m = setback_m
@@ -109,14 +116,14 @@ def plan_in_lane(
     for _ in range(halvings):
         middle_m = 0.5 * (failed_m + found_m)
         if slow_down_to_slot(
-            fleet, proposal, row, leader, from_s, slot_m - middle_m, slowest_share, rules
+            fleet, proposal, row, leader, from_s, slot_m - middle_m, clears, rules
         ):
             found_m = middle_m
         else:
             failed_m = middle_m
     if halvings > 0:
         n = slow_down_to_slot(
-            fleet, proposal, row, leader, from_s, slot_m - found_m, slowest_share, rules
+            fleet, proposal, row, leader, from_s, slot_m - found_m, clears, rules
         )
     return proposal.pieces[0, :n], free_m - slot_m + found_m
 
@@ -154,7 +161,7 @@ def slow_down_to_slot(
     leader: int,
     from_s: float,
     slot_m: float,
-    slowest_share: float,
+    clears: bool,
     rules: Rules,
 ) -> int:
     """Fills the proposal with a slower cruise into a slot; returns its length, 0 for none.
@@ -167,19 +174,19 @@ def slow_down_to_slot(
     ramp_mps = road.ramp_speed_mps
     merge_m = 0.5 * (v0 * v0 - ramp_mps * ramp_mps) / rules.motion.free_acceleration_mps2
     latest_s = (merge_m - slot_m) / v0
-    if ends_safely(fleet, proposal, row, from_s, latest_s, slot_m, slowest_share, rules):
+    if ends_safely(fleet, proposal, row, from_s, latest_s, slot_m, clears, rules):
         return proposal.piece_count[0]
     too_late_s, good_s = latest_s, -math.inf
     if leader >= 0:
         ahead = committed(fleet, leader)
         wave_s = ahead[len(ahead) - 1, TIME] + rules.safety.time_gap_s
         if from_s < wave_s < latest_s and ends_safely(
-            fleet, proposal, row, from_s, wave_s, slot_m, slowest_share, rules
+            fleet, proposal, row, from_s, wave_s, slot_m, clears, rules
         ):
             return proposal.piece_count[0]
     for share in END_SHARES:
         end_s = from_s + share * (latest_s - from_s)
-        if ends_safely(fleet, proposal, row, from_s, end_s, slot_m, slowest_share, rules):
+        if ends_safely(fleet, proposal, row, from_s, end_s, slot_m, clears, rules):
             good_s = end_s
             break
         too_late_s = end_s
@@ -187,11 +194,11 @@ def slow_down_to_slot(
         return 0
     for _ in range(HALVINGS):
         middle_s = 0.5 * (good_s + too_late_s)
-        if ends_safely(fleet, proposal, row, from_s, middle_s, slot_m, slowest_share, rules):
+        if ends_safely(fleet, proposal, row, from_s, middle_s, slot_m, clears, rules):
             good_s = middle_s
         else:
             too_late_s = middle_s
-    ends_safely(fleet, proposal, row, from_s, good_s, slot_m, slowest_share, rules)
+    ends_safely(fleet, proposal, row, from_s, good_s, slot_m, clears, rules)
     return proposal.piece_count[0]
 
 
@@ -203,33 +210,18 @@ def ends_safely(
     from_s: float,
     end_s: float,
     slot_m: float,
-    slowest_share: float,
+    clears: bool,
     rules: Rules,
 ) -> bool:
     """Fills the proposal with the slower cruise that ends at ``end_s``; returns if it is safe."""
-    station_m, speed_mps = station_and_speed(committed(fleet, row), from_s)
-    v0, motion = rules.road.mainline_speed_mps, rules.motion
+    lowest_mps = min(
+        station_and_speed(committed(fleet, row), from_s)[1],
+        SLOWEST_SHARE * rules.road.mainline_speed_mps,
+    )
     out = proposal.pieces[0]
-    lowest_mps = min(speed_mps, slowest_share * v0)
-    for rise_first in (True, False):
-        n = begin(out, from_s, station_m, speed_mps)
-        if rise_first:
-            if speed_mps >= v0:
-                continue
-            n = drive_to_speed(out, n, motion.speed_up_mps2, v0)
-        more = slow_phase(
-            out[n - 1 :],
-            out[n - 1, TIME],
-            out[n - 1, STATION],
-            out[n - 1, SPEED],
-            end_s,
-            slot_m,
-            v0,
-            motion.slow_down_mps2,
-            motion.speed_up_mps2,
-        )
-        n += more - 1
-        if more == 0 or out[:n, SPEED].min() < lowest_mps:
+    for share in CRUISE_SHARES:
+        n = slow_cruise(out, committed(fleet, row), from_s, end_s, slot_m, share, clears, rules)
+        if n == 0 or out[:n, SPEED].min() < lowest_mps:
             continue
         proposal.size[0], proposal.rows[0], proposal.piece_count[0] = 1, row, n
         proposal.merge_time_s[0] = -math.inf
@@ -237,6 +229,51 @@ def ends_safely(
         if unsafe < 0:
             return True
     return False
+
+
+@kernel
+def slow_cruise(
+    out: FloatArray,
+    entry: FloatArray,
+    from_s: float,
+    end_s: float,
+    slot_m: float,
+    share: float,
+    clears: bool,
+    rules: Rules,
+) -> int:
+    """Writes the way into a slot with a slower cruise that ends at ``end_s``; returns its length.
+
+    The vehicle goes up to v0 first, to make room at the entrance, and begins to slow down so late
+    that its slower cruise takes ``share`` of the time there is for it. With a share of 0 it goes to
+    the slower speed at once. 0 where there is no such way.
+    """
+    v0, motion = rules.road.mainline_speed_mps, rules.motion
+    station_m, speed_mps = station_and_speed(entry, from_s)
+    n = begin(out, from_s, station_m, speed_mps)
+    if share > 0.0:
+        if clears and speed_mps < v0:
+            n = drive_to_speed(out, n, motion.comfort_mps2, v0)
+        else:
+            n = change_speed(out, n, v0, motion)
+        lag = max(0.0, out[n - 1, STATION] - v0 * out[n - 1, TIME] - slot_m)
+        rates = 1.0 / motion.slow_down_mps2 + 1.0 / motion.speed_up_mps2
+        spare_s = end_s - out[n - 1, TIME] - (math.sqrt(2.0 * lag * rates) + SHORTEST_CRUISE_S)
+        if spare_s < 0.0:
+            return 0
+        n = drive(out, n, 0.0, (1.0 - share) * spare_s)
+    more = slow_phase(
+        out[n - 1 :],
+        out[n - 1, TIME],
+        out[n - 1, STATION],
+        out[n - 1, SPEED],
+        end_s,
+        slot_m,
+        v0,
+        motion.slow_down_mps2,
+        motion.speed_up_mps2,
+    )
+    return n - 1 + more if more > 0 else 0
 
 
 @kernel

@@ -5,6 +5,7 @@ Each vehicle of either stream gets the first free slot after its own earliest ti
 these times, and is never planned again.
 """
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -44,23 +45,29 @@ class Slots:
         300.0, 1.0, 3600.0, meaning="after so long a wait, first come, first served"
     )
 
+    clear_entrance: bool = parameter(
+        True, meaning="mainline vehicles speed up as hard as is comfortable as they enter"
+    )
+
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the slot of the first subject, or when it is to be asked again."""
         claims: Claims = memory if isinstance(memory, tuple) else ()
         row = first_to_plan(view)
         rest = tuple((view.time_s, other) for other in view.subjects if other != row)
         merge_s = float(view.fleet.merge_time_s[row])
-        if merge_s == -float("inf"):
+        if merge_s == -math.inf:
             return self._in_lane(view, row, rest, claims)
-        if merge_s < float("inf"):
+        if merge_s < math.inf:
             return Decision((), rest, claims)
         return self._onto_lane(view, row, rest, claims)
 
     def _in_lane(
         self, view: View, row: int, rest: tuple[tuple[float, int], ...], claims: Claims
     ) -> Decision:
-        pieces, _ = plan_in_lane(view.fleet, row, view.time_s, 0.5, view.packed_rules)
-        commands = (FollowTrajectory(row, pieces, -float("inf")),) if len(pieces) else ()
+        pieces, _ = plan_in_lane(
+            view.fleet, row, view.time_s, self.clear_entrance, view.packed_rules
+        )
+        commands = (FollowTrajectory(row, pieces, -math.inf),) if len(pieces) else ()
         head = tuple((view.time_s, other) for other, _, waits in claims[:1] if waits)
         return Decision(commands, (*rest, *head), claims)
 
@@ -99,13 +106,13 @@ class Slots:
     def _goes_now(self, view: View, claim_s: float, ahead_s: float) -> bool:
         """Whether a ramp vehicle gets its slot before the mainline vehicle that waits longest."""
         since_s = view.waiting.first_since_s(False)
-        if since_s == float("inf"):
+        if since_s == math.inf:
             return True
         waited_s, late_s = view.time_s - since_s, view.time_s + ahead_s - claim_s
         share = self.ramp_share
         if max(waited_s, late_s) > self.longest_wait_s:
             share = 0.5
-        if view.waiting.first_since_s(True) < float("inf"):
+        if view.waiting.first_since_s(True) < math.inf:
             share = max(share, 0.5)
         return share * late_s >= (1.0 - share) * waited_s
 
