@@ -90,6 +90,8 @@ def asked_table(run: ShownRun) -> Table:
 def _errors(positioning_error_m: float, run: ShownRun) -> str:
     safety = run.scenario.safety
     gap = f"; time gap {safety.time_gap_s:g} s" if safety.time_gap_s else ""
+    if safety.standstill_gap_m:
+        gap += f"; standstill gap {safety.standstill_gap_m:g} m"
     return f"{positioning_error_m:g} m, {safety.clock_error_s:g} s{gap}"
 
 
