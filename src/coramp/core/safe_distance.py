@@ -118,9 +118,10 @@ def standing_clearance_m(road: Road, safety: SafetyBudget, stop_mps2: float) -> 
     """Returns the bumper distance (m) planned between two vehicles that stop one behind the other.
 
     Eq. 1 at a stand, the standstill gap with it, plus what a time gap and the clock error ask for
-    on the way. Per m/s these are ``T = time_gap + 2 clock_error`` at most. At speed v the follower is ``v^2 / (2 d)`` before its
-    stop and must keep ``v^2 / (2 g (phi + psi)) + T v`` from the vehicle that stands, so its stop
-    lies by the largest ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
+    on the way. Per m/s these are ``T = time_gap + 2 clock_error`` at most. At speed v the follower
+    is ``v^2 / (2 d)`` before its stop and must keep ``v^2 / (2 g (phi + psi)) + T v`` from the
+    vehicle that stands, so its stop lies by the largest
+    ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
     """
     still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
     per_speed_s = safety.time_gap_s + 2.0 * safety.clock_error_s
