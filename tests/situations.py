@@ -68,10 +68,10 @@ def named(arrivals):
 
 
 @st.composite
-def situations(draw):
-    """A scenario with traffic, and a strategy that plans."""
+def situations(draw, names=tuple(COOPERATIVE)):
+    """A scenario with traffic, and a cooperative strategy, of those named."""
     scenario = draw(scenarios())
-    return scenario, draw(traffic(scenario)), draw(st.sampled_from(COOPERATIVE))
+    return scenario, draw(traffic(scenario)), draw(st.sampled_from(names))
 
 
 def loop(scenario, arrivals, strategy, last_s=400.0):

@@ -22,6 +22,7 @@ from coramp.core.safe_distance import following_clearance_m
 from coramp.core.trajectory import MAX_PIECES, SPEED, clip_end, drive_to_speed, time_at_station
 
 SECONDS_PER_HOUR = 3600.0
+NOTHING_SAVED = np.zeros(1)
 
 
 class Arrived(NamedTuple):
@@ -98,13 +99,20 @@ def earliest_exits_s(
 
 
 @kernel
-def first_come_exits_s(earliest_s: FloatArray, headway_s: float) -> FloatArray:
-    """Returns each vehicle's exit (s) where the first to come is the first to leave."""
+def first_come_exits_s(
+    earliest_s: FloatArray, headway_s: float, saved_s: FloatArray = NOTHING_SAVED
+) -> FloatArray:
+    """Returns each vehicle's exit (s) where the first to come is the first to leave.
+
+    ``saved_s[n]`` is by how much n headways together may at most be shorter than n h; what lies
+    beyond its end saves as much as its last entry.
+    """
     exit_s = np.empty(len(earliest_s))
-    last_s = -np.inf
+    last_s, behind = -np.inf, 0
     for i in np.argsort(earliest_s, kind="mergesort"):
+        behind = behind + 1 if last_s + headway_s > earliest_s[i] else 0
         last_s = max(earliest_s[i], last_s + headway_s)
-        exit_s[i] = last_s
+        exit_s[i] = max(earliest_s[i], last_s - saved_s[min(behind, len(saved_s) - 1)])
     return exit_s
 
 
@@ -113,18 +121,19 @@ def quickest_exits_s(earliest_s: FloatArray, exit_s: FloatArray) -> FloatArray:
     return np.fmin(earliest_s, exit_s)
 
 
-def closest_headway_s(headway_s: float, exit_s: FloatArray) -> float:
-    """Returns h, or less where two vehicles of a run left (nan: never) closer to each other."""
-    left_s = np.sort(exit_s[~np.isnan(exit_s)])
-    return float(np.min(np.diff(left_s), initial=headway_s))
+def saved_s(headway_s: float, exit_s: FloatArray) -> FloatArray:
+    """Returns by how much n headways of a run were at most shorter than n h (s), for n = 0, 1, ..
+
+    ``exit_s`` are the run's exits, nan for never. Zeros but where vehicles left below v0.
+    """
+    short_s = headway_s - np.diff(np.sort(exit_s[~np.isnan(exit_s)]))
+    longest_first_s = np.sort(short_s[short_s > 0.0])[::-1]
+    return np.concatenate([NOTHING_SAVED, np.cumsum(longest_first_s)])
 
 
-def delay_bound(
-    arrived: Arrived, earliest_s: FloatArray, headway_s: float, end_s: float
-) -> DelayBound:
-    """Returns the mean delays of the recursion; whoever is not out by ``end_s`` counts up to it."""
-    exit_s = np.minimum(first_come_exits_s(earliest_s, headway_s), end_s)
-    delay_s = exit_s - arrived.scheduled_s - arrived.free_flow_s
+def delay_bound(arrived: Arrived, exit_s: FloatArray, end_s: float) -> DelayBound:
+    """Returns the mean delays of given exits; whoever is not out by ``end_s`` counts up to it."""
+    delay_s = np.minimum(exit_s, end_s) - arrived.scheduled_s - arrived.free_flow_s
     return DelayBound(
         _mean_s(delay_s), _mean_s(delay_s[~arrived.on_ramp]), _mean_s(delay_s[arrived.on_ramp])
     )

@@ -8,12 +8,13 @@ from coramp._kernel import FloatArray
 from coramp.core.rules import packed
 from coramp.metrics.delay_bound import (
     Arrived,
-    closest_headway_s,
     delay_bound,
     earliest_exits_s,
+    first_come_exits_s,
     lane_headway_s,
     lane_limit_veh_h,
     quickest_exits_s,
+    saved_s,
 )
 from coramp.metrics.motion import hard_brakings, stopped_vehicles
 from coramp.records import Outcome
@@ -36,7 +37,7 @@ def bound_figures(
     """Returns the mean delay of all vehicles and what the lane allows; null for drivers.
 
     The bound holds for this run whatever its plans: where they brought a vehicle out earlier than
-    its free movement, or two closer than h, that counts instead.
+    its free movement, or two closer than h, that is granted.
     """
     mean_s = _known(float(np.mean(delay_s))) if len(delay_s) else None
     if not outcome.cooperative:
@@ -45,12 +46,9 @@ def bound_figures(
     shortest_m = passages.length_m.min() if len(passages) else scenario.vehicle.length_m
     headway_s = lane_headway_s(float(shortest_m), rules)
     arrived = Arrived(passages.scheduled_s, passages.on_ramp, passages.entry_speed_mps, free_flow_s)
-    bound = delay_bound(
-        arrived,
-        quickest_exits_s(earliest_exits_s(*arrived[:3], packed(rules)), passages.exit_s),
-        closest_headway_s(headway_s, passages.exit_s),
-        outcome.end_s,
-    )
+    earliest_s = quickest_exits_s(earliest_exits_s(*arrived[:3], packed(rules)), passages.exit_s)
+    least_s = first_come_exits_s(earliest_s, headway_s, saved_s(headway_s, passages.exit_s))
+    bound = delay_bound(arrived, least_s, outcome.end_s)
     ratio = mean_s / bound.all_s if mean_s is not None and bound.all_s >= LEAST_BOUND_S else None
     return {
         "delay_s": mean_s,

@@ -136,12 +136,18 @@ def notes(run: ShownRun) -> list[str]:
 def comparison_table(runs: Sequence[ShownRun]) -> Table:
     """Returns the figures of runs side by side."""
     lines: list[tuple[str, str, int]] = [
+        ("delay of all, mean (s)", "delay_s", 2),
+        ("least delay that the lane allows, of all (s)", "delay_bound_s", 2),
+        ("delay over the least that the lane allows", "delay_bound_ratio", 2),
         ("mainline delay, mean (s)", "mainline_delay_s", 2),
         ("mainline delay, 95th percentile (s)", "mainline_delay_p95_s", 2),
         ("ramp delay, mean (s)", "ramp_delay_s", 2),
         ("ramp delay, 95th percentile (s)", "ramp_delay_p95_s", 2),
         ("mainline speed, mean (m/s)", "mainline_speed_mps", 2),
         ("ramp speed, mean (m/s)", "ramp_speed_mps", 2),
+        ("mainline delay, first come first served (s)", "mainline_fcfs_delay_s", 2),
+        ("ramp delay, first come first served (s)", "ramp_fcfs_delay_s", 2),
+        ("most that the lane carries (veh/h)", "lane_limit_veh_h", 0),
         ("fuel (l)", "fuel_l", 2),
         ("mainline vehicles", "vehicles_mainline", 0),
         ("ramp vehicles", "vehicles_ramp", 0),
@@ -151,13 +157,16 @@ def comparison_table(runs: Sequence[ShownRun]) -> Table:
         ("smallest margin over Eq. 1 (m)", "min_margin_m", 3),
         ("smallest time to collision (s)", "min_ttc_s", 2),
         ("hardest braking (m/s²)", "max_decel_mps2", 2),
+        ("brakings beyond 3 m/s²", "hard_brakings_3", 0),
+        ("brakings beyond 4.5 m/s²", "hard_brakings_4_5", 0),
+        ("vehicles that stopped on their way", "stops", 0),
         ("largest difference between plan and SUMO (m)", "plan_error_m", 4),
         *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
     ]
     rows = tuple(
-        (text, *(number(run.summary[key], digits) for run in runs))
+        (text, *(number(run.summary.get(key), digits) for run in runs))
         for text, key, digits in lines
-        if any(run.summary[key] is not None for run in runs)
+        if any(run.summary.get(key) is not None for run in runs)
     )
     return Table("Figures", ("what", *(run.title for run in runs)), rows)
 
