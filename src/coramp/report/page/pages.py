@@ -103,6 +103,17 @@ def answer(run: ShownRun) -> str:
     return (
         f"With {run.title}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s on "
         f"the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."
+        f"{_against_the_bound(row)}"
+    )
+
+
+def _against_the_bound(row: Row) -> str:
+    ratio = row.get("delay_bound_ratio")
+    if ratio is None:
+        return ""
+    return (
+        f" All together lose {number(row['delay_s'])} s, {number(ratio)} times the "
+        f"{number(row['delay_bound_s'])} s that the lane allows at best."
     )
 
 
