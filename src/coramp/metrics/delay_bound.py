@@ -34,10 +34,10 @@ class Arrived(NamedTuple):
     free_flow_s: FloatArray
 
 
-class DelayBound(NamedTuple):
-    """Mean delays (s) of the recursion: of all vehicles, and of each stream; nan for none.
+class MeanDelays(NamedTuple):
+    """Mean delays (s) of all vehicles and of each stream, nan for none.
 
-    Only ``all_s`` is a bound. The streams' are what they lose in the order of earliest exits.
+    Of the recursion's only that of all is a bound.
     """
 
     all_s: float
@@ -131,10 +131,10 @@ def saved_s(headway_s: float, exit_s: FloatArray) -> FloatArray:
     return np.concatenate([NOTHING_SAVED, np.cumsum(longest_first_s)])
 
 
-def delay_bound(arrived: Arrived, exit_s: FloatArray, end_s: float) -> DelayBound:
-    """Returns the mean delays of given exits; whoever is not out by ``end_s`` counts up to it."""
-    delay_s = np.minimum(exit_s, end_s) - arrived.scheduled_s - arrived.free_flow_s
-    return DelayBound(
+def mean_delays(arrived: Arrived, exit_s: FloatArray) -> MeanDelays:
+    """Returns the mean delays of vehicles that leave then."""
+    delay_s = exit_s - arrived.scheduled_s - arrived.free_flow_s
+    return MeanDelays(
         _mean_s(delay_s), _mean_s(delay_s[~arrived.on_ramp]), _mean_s(delay_s[arrived.on_ramp])
     )
 

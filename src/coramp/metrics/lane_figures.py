@@ -8,11 +8,11 @@ from coramp._kernel import FloatArray
 from coramp.core.rules import packed
 from coramp.metrics.delay_bound import (
     Arrived,
-    delay_bound,
     earliest_exits_s,
     first_come_exits_s,
     lane_headway_s,
     lane_limit_veh_h,
+    mean_delays,
     quickest_exits_s,
     saved_s,
 )
@@ -36,8 +36,9 @@ def bound_figures(
 ) -> dict[str, float | None]:
     """Returns the mean delay of all vehicles and what the lane allows; null for drivers.
 
-    The bound holds for this run whatever its plans: where they brought a vehicle out earlier than
-    its free movement, or two closer than h, that is granted.
+    The streams' delays first come, first served, are those of the arrivals alone. The bound holds
+    for this run whatever its plans: where they brought a vehicle out earlier than its free
+    movement, or two closer than h, that is granted.
     """
     mean_s = _known(float(np.mean(delay_s))) if len(delay_s) else None
     if not outcome.cooperative:
@@ -46,16 +47,18 @@ def bound_figures(
     shortest_m = passages.length_m.min() if len(passages) else scenario.vehicle.length_m
     headway_s = lane_headway_s(float(shortest_m), rules)
     arrived = Arrived(passages.scheduled_s, passages.on_ramp, passages.entry_speed_mps, free_flow_s)
-    earliest_s = quickest_exits_s(earliest_exits_s(*arrived[:3], packed(rules)), passages.exit_s)
-    least_s = first_come_exits_s(earliest_s, headway_s, saved_s(headway_s, passages.exit_s))
-    bound = delay_bound(arrived, least_s, outcome.end_s)
-    ratio = mean_s / bound.all_s if mean_s is not None and bound.all_s >= LEAST_BOUND_S else None
+    earliest_s = earliest_exits_s(*arrived[:3], packed(rules))
+    served = mean_delays(arrived, first_come_exits_s(earliest_s, headway_s))
+    quickest_s = quickest_exits_s(earliest_s, passages.exit_s)
+    saved = saved_s(headway_s, passages.exit_s)
+    least_s = np.minimum(first_come_exits_s(quickest_s, headway_s, saved), outcome.end_s)
+    bound_s = mean_delays(arrived, least_s).all_s
     return {
         "delay_s": mean_s,
-        "delay_bound_s": _known(bound.all_s),
-        "delay_bound_ratio": ratio,
-        "mainline_fcfs_delay_s": _known(bound.mainline_s),
-        "ramp_fcfs_delay_s": _known(bound.ramp_s),
+        "delay_bound_s": _known(bound_s),
+        "delay_bound_ratio": mean_s / bound_s if mean_s and bound_s >= LEAST_BOUND_S else None,
+        "mainline_fcfs_delay_s": _known(served.mainline_s),
+        "ramp_fcfs_delay_s": _known(served.ramp_s),
         "lane_limit_veh_h": lane_limit_veh_h(headway_s),
     }
 
