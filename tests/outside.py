@@ -91,6 +91,7 @@ def _eq_1(front_mps: np.ndarray, rear_mps: np.ndarray, spec: dict) -> np.ndarray
         + safety["clock_error_s"] * (front_mps + rear_mps)
         + closing_km_h**2 / (254 * friction)
         + safety["time_gap_s"] * rear_mps
+        + safety["standstill_gap_m"]
     )
 
 

@@ -18,6 +18,7 @@ COOPERATIVE = [name for name, s in strategies().items() if s.cooperative]
 
 OVERRIDES = {
     "safety.time_gap_s": [0.0, 0.0, 0.6, 1.4],
+    "safety.standstill_gap_m": [0.0, 0.0, 2.5],
     "safety.positioning_error_m": [0.02, 0.5],
     "safety.clock_error_s": [3e-9, 0.01],
     "safety.adhesion": [0.4, 0.1],
@@ -67,10 +68,10 @@ def named(arrivals):
 
 
 @st.composite
-def situations(draw):
-    """A scenario with traffic, and a strategy that plans."""
+def situations(draw, names=tuple(COOPERATIVE)):
+    """A scenario with traffic, and a cooperative strategy, of those named."""
     scenario = draw(scenarios())
-    return scenario, draw(traffic(scenario)), draw(st.sampled_from(COOPERATIVE))
+    return scenario, draw(traffic(scenario)), draw(st.sampled_from(names))
 
 
 def loop(scenario, arrivals, strategy, last_s=400.0):
@@ -129,6 +130,7 @@ def eq_1(front_mps, rear_mps, safety):
         + safety.clock_error_s * (front_mps + rear_mps)
         + closing**2 / (254 * (safety.adhesion + safety.resistance))
         + safety.time_gap_s * rear_mps
+        + safety.standstill_gap_m
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from coramp.demand import demand_above_limit, demands_above_limit
 from coramp.engines.sumo.engine import SumoOptions
 from coramp.errors import CorampError
 from coramp.explanation import Quantity, quantities
@@ -178,11 +179,13 @@ def run(
     out: str | Path | None = None,
     keep_sumo: bool = False,
     gui: bool = False,
+    notice: Callable[[str], None] | None = None,
 ) -> RunResult:
     """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
-    run (default: fair). Raises CorampError for what cannot be run and for a run that fails.
+    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit.
+    Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
     """
@@ -200,9 +203,11 @@ def run(
     if engine != "sumo" and (keep_sumo or gui):
         option = "--keep-sumo" if keep_sumo else "--gui"
         raise CorampError(f"{option}: the {engine} engine runs without SUMO; use --engine sumo")
+    if out is None and keep_sumo:
+        raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
+    if notice is not None and (line := demand_above_limit(spec)) is not None:
+        notice(line)
     if out is None:
-        if keep_sumo:
-            raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
         return _executed(spec, SumoOptions(gui=gui))
     with staged_folder(Path(out), MARK) as stage:
         result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
@@ -234,6 +239,7 @@ def study(
     out: str | Path | None = None,
     many: bool = False,
     progress: Callable[[Progress], None] | None = None,
+    notice: Callable[[str], None] | None = None,
 ) -> StudyResult:
     """Runs what a study still lacks and returns all of it.
 
@@ -241,13 +247,16 @@ def study(
     ``out/NAME``), and a study that was interrupted goes on from there. ``jobs`` processes work at
     a time (default: one a core), or the workers of a Dask ``cluster``. ``engine`` moves the
     cooperative runs to another engine. ``many`` allows more than a hundred thousand runs.
-    ``progress`` is called at the start and after every run. Raises CorampError for a study that
-    cannot be run; runs that fail are rows of the result.
+    ``progress`` is called at the start and after every run, ``notice`` once beforehand where the
+    demand of runs is above their lane's limit. Raises CorampError for a study that cannot be run;
+    runs that fail are rows of the result.
     """
     definition, seeds = _defined(name, seeds, engine, many)
     jobs = _jobs_checked(jobs)
     specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
+    if notice is not None and (line := demands_above_limit(specs)) is not None:
+        notice(line)
     with connected(cluster) if cluster is not None else nullcontext():
         store = Store(_folder_of(definition, out), definition)
         jobs = ALL_WORKERS if cluster is not None else jobs

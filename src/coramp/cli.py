@@ -142,7 +142,7 @@ def run(
 ) -> None:
     """Run one scenario."""
     from coramp.api import run as run_scenario
-    from coramp.console import print_json, print_run, tell_of_compiling, working
+    from coramp.console import print_json, print_run, tell_of_compiling, tell_of_demand, working
     from coramp.toml_files import parse_overrides
 
     tell_of_compiling()
@@ -160,6 +160,7 @@ def run(
             out=out,
             keep_sumo=keep_sumo,
             gui=gui,
+            notice=tell_of_demand,
         )
     if json:
         print_json(result.content)
@@ -200,6 +201,7 @@ def study(
         print_study,
         study_json,
         tell_of_compiling,
+        tell_of_demand,
     )
 
     if dry_run or status:
@@ -220,6 +222,7 @@ def study(
             out=out,
             many=yes,
             progress=progress,
+            notice=tell_of_demand,
         )
     if json:
         print_json(study_json(result))

@@ -78,6 +78,11 @@ def tell_of_compiling() -> None:
         print("Compiling the kernels, once (a minute or two) ...", file=sys.stderr)
 
 
+def tell_of_demand(line: str) -> None:
+    """Says on stderr that more arrive than the lane carries."""
+    print(f"Note: {line}", file=sys.stderr)
+
+
 @contextmanager
 def working(text: str) -> Iterator[None]:
     """Shows that something is under way, on a terminal only."""
@@ -95,6 +100,8 @@ def run_table(summary: Row) -> Table:
     if summary["drivers"]:
         who += f", {summary['drivers']} drivers"
     lines = [
+        ("delay of all (s): mean", number(summary["delay_s"])),
+        *_bound_lines(summary),
         (
             "mainline delay (s): mean, 95th percentile",
             _two(summary, "mainline_delay_s", "mainline_delay_p95_s"),
@@ -127,6 +134,12 @@ def run_table(summary: Row) -> Table:
             _two(summary, "max_severity", "max_decel_mps2"),
         ),
     ]
+    lines += [
+        (
+            "brakings beyond 3 and 4.5 m/s2, vehicles that stopped",
+            f"{summary['hard_brakings_3']}, {summary['hard_brakings_4_5']}, {summary['stops']}",
+        ),
+    ]
     if summary["drivers"] is None:
         rungs = ("free", "reach", "create", "delay", "hold")
         lines += [
@@ -145,6 +158,18 @@ def run_table(summary: Row) -> Table:
         f"veh/h, seed {summary['seed']}"
     )
     return Table(title, ("what", "value"), tuple(lines))
+
+
+def _bound_lines(summary: Row) -> list[tuple[str, str]]:
+    if summary["lane_limit_veh_h"] is None:
+        return []
+    return [
+        (
+            "least delay that the lane allows (s), delay over that",
+            _two(summary, "delay_bound_s", "delay_bound_ratio"),
+        ),
+        ("most that the lane carries (veh/h)", number(summary["lane_limit_veh_h"], 0)),
+    ]
 
 
 def _two(summary: Row, first: str, second: str) -> str:

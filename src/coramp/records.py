@@ -16,14 +16,15 @@ class Passages:
     """One entry a vehicle, in the order of scheduled times; nan where something never happened.
 
     ``merge_s`` is when a ramp vehicle changed to the mainline, minus infinity for mainline
-    vehicles. ``plan_error_m`` is the largest distance seen between plan and simulator, nan
-    without a plan.
+    vehicles. ``entry_speed_mps`` is the scheduled one. ``plan_error_m`` is the largest distance
+    seen between plan and simulator, nan without a plan.
     """
 
     vehicle_id: tuple[str, ...]
     on_ramp: BoolArray
     length_m: FloatArray
     scheduled_s: FloatArray
+    entry_speed_mps: FloatArray
     entry_s: FloatArray
     merge_s: FloatArray
     exit_s: FloatArray
@@ -66,3 +67,8 @@ class Outcome:
     refusals: tuple[Refusal, ...] = ()
     interventions: int = 0
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+
+    @property
+    def until_s(self) -> FloatArray:
+        """When each vehicle left, or the run ended without it."""
+        return np.where(np.isnan(self.passages.exit_s), self.end_s, self.passages.exit_s)

@@ -90,6 +90,7 @@ class Safety(Model):
     adhesion: Annotated[float, Field(gt=0.0, le=2.0)] = 0.4
     resistance: Annotated[float, Field(ge=0.0, le=1.0)] = 0.11
     time_gap_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    standstill_gap_m: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     execution_allowance_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
 
 

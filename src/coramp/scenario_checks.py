@@ -1,10 +1,11 @@
 """What must fit together in a scenario whose values are sensible each by itself."""
 
+import math
 from typing import TYPE_CHECKING
 
 from coramp.core.gaps import least_acceleration_mps2
 from coramp.core.ramp_acceleration import lag_m
-from coramp.core.safe_distance import merge_clearance_m
+from coramp.core.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.errors import CorampError
 from coramp.strategies.parameters import wrong_settings, wrong_together
 from coramp.strategies.registry import strategy_named
@@ -164,7 +165,9 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
             f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
         )
     first, last = decision_station_range_m(scenario)
-    if first > last:
+    if gaps := _gap_problems(scenario, first, last):
+        problems += gaps
+    elif first > last:
         problems.append(
             "ramp.decision_station_m: there is none at which all that matter have entered "
             f"({first:.1f} m or later) and it can still stop ({last:.1f} m or earlier); "
@@ -177,6 +180,39 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
             f"allowed is {first:.1f} to {last:.1f} m"
         )
     return problems
+
+
+def _gap_problems(scenario: "Scenario", first_m: float, last_m: float) -> list[str]:
+    """What is wrong with the gaps, if it is they that leave the decision station too early.
+
+    A vehicle that enters as another is planned must find room behind that one's merge. Where the
+    clearance fits there, everyone is served in the end, however long the queue.
+    """
+    road, safety = scenario.rules().road, scenario.rules().safety
+    v0, station_m = road.mainline_speed_mps, road.decision_station_m
+    short_m = (first_m - station_m) * v0 / road.ramp_speed_mps
+    bare = safety._replace(time_gap_s=0.0, standstill_gap_m=0.0)
+    most_clearance_m = merge_clearance_m(road, safety) - short_m
+    if short_m <= 0.0 or station_m > last_m or most_clearance_m < merge_clearance_m(road, bare):
+        return []
+    room_m = most_clearance_m - following_clearance_m(road, bare)
+    gaps_m = {"time_gap_s": safety.time_gap_s * v0, "standstill_gap_m": safety.standstill_gap_m}
+    larger, smaller = sorted(gaps_m, key=lambda name: -gaps_m[name])
+    allowed_m = {larger: max(0.0, room_m - gaps_m[smaller])}
+    if gaps_m[smaller] > room_m:
+        allowed_m[smaller] = room_m
+    return [_too_long(scenario, name, most_m) for name, most_m in allowed_m.items()]
+
+
+def _too_long(scenario: "Scenario", name: str, most_m: float) -> str:
+    unit, most = "m", most_m
+    if name == "time_gap_s":
+        unit, most = "s", most_m / scenario.mainline.speed_mps
+    return (
+        f"safety.{name}: {getattr(scenario.safety, name):g} {unit} does not fit on the mainline "
+        f"from {scenario.mainline.start_m:g} m to the merge of a vehicle that is planned at "
+        f"ramp.decision_station_m; allowed is up to {math.floor(1000.0 * most) / 1000.0:g} {unit}"
+    )
 
 
 def decision_station_range_m(scenario: "Scenario") -> tuple[float, float]:

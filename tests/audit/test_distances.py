@@ -43,14 +43,21 @@ BOUNDS = Bounds(
     clock_error_s=3e-9,
     friction=0.51,
     time_gap_s=0.0,
+    standstill_gap_m=0.0,
     allowance_m=0.1,
     comfort_mps2=2.94,
     ramp_acceleration_mps2=6.0,
     gap_speed_factor=1.1,
 )
 # errors large enough to be seen, in the words of the checker and of the planners
-WIDE_BOUNDS = BOUNDS._replace(positioning_error_m=0.3, clock_error_s=0.05, time_gap_s=0.4)
-WIDE_SAFETY = SAFETY._replace(positioning_error_m=0.3, clock_error_s=0.05, time_gap_s=0.4)
+WIDE = {
+    "positioning_error_m": 0.3,
+    "clock_error_s": 0.05,
+    "time_gap_s": 0.4,
+    "standstill_gap_m": 1.5,
+}
+WIDE_BOUNDS = BOUNDS._replace(**WIDE)
+WIDE_SAFETY = SAFETY._replace(**WIDE)
 BUDGETS = st.sampled_from([(BOUNDS, SAFETY), (WIDE_BOUNDS, WIDE_SAFETY)])
 
 # 10 m/s for 3 s, up to 20 m/s in 5 s (75 m), down to a stand in 10 s (100 m)
@@ -129,8 +136,8 @@ def test_following_distance_by_hand():
     assert following_distance_m(17.0, 20.0, BOUNDS) == close(0.9404169706572487)
     # 0.36^2 / 129.54
     assert following_distance_m(19.9, 20.0, BOUNDS) == close(0.041000582877397)
-    # 0.6 + 0.05 * 37 + 0.4 * 20, and the same
-    assert following_distance_m(17.0, 20.0, WIDE_BOUNDS) == close(11.350416859657248)
+    # 0.6 + 0.05 * 37 + 0.4 * 20 + 1.5, and the same
+    assert following_distance_m(17.0, 20.0, WIDE_BOUNDS) == close(12.850416859657248)
 
 
 def test_lane_change_distance_by_hand():
@@ -298,8 +305,8 @@ def test_margin_at_least_by_hand():
     # the lane change at 18 m/s beside 22 m/s: (3.6 (22 - 18 cos 30))^2 / 129.54 and 0.04
     needed_m = 0.04 + (3.6 * (22.0 - 15.588457268119896)) ** 2 / 129.54
     assert margin_at_least_m(front, 5.0, rear, BOUNDS) == close(25.0 - needed_m)
-    # with a time gap Eq. 1: 0.6 + 0.05 (18 + 22 + 3) + 14.4^2 / 129.54 + 0.4 * 22
-    following_m = 0.6 + 2.15 + 207.36 / 129.54 + 8.8
+    # with both gaps Eq. 1: 0.6 + 0.05 (18 + 22 + 3) + 14.4^2 / 129.54 + 0.4 * 22 + 1.5
+    following_m = 0.6 + 2.15 + 207.36 / 129.54 + 8.8 + 1.5
     assert margin_at_least_m(front, 5.0, rear, WIDE_BOUNDS) == close(25.0 - following_m)
     # slow in front and fast behind, or the other way round, asks the same of a lane change
     front, rear = Envelope(100.0, 110.0, 19.0, 22.0), Envelope(60.0, 70.0, 18.0, 21.0)

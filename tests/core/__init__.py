@@ -19,6 +19,7 @@ SAFETY = SafetyBudget(
     adhesion=0.4,
     resistance=0.11,
     time_gap_s=0.0,
+    standstill_gap_m=0.0,
     execution_allowance_m=0.1,
 )
 MOTION = MotionLimits(
@@ -122,6 +123,7 @@ def sampled_margins(front, front_length_m, rear, times_s, safety):
         - safety.clock_error_s * (front_mps + rear_mps)
         - closing_km_h**2 / (254.0 * (safety.adhesion + safety.resistance))
         - safety.time_gap_s * rear_mps
+        - safety.standstill_gap_m
     )
 
 

@@ -49,6 +49,13 @@ def test_eq_1_with_a_time_gap_adds_the_follower_s_travel():
     assert safe_distance_m(20.0, 17.0, SAFETY._replace(time_gap_s=0.5)) == close(8.540000111)
 
 
+def test_eq_1_with_a_standstill_gap_adds_it_at_every_speed():
+    # 0.04 + 3e-9 * 37 + 116.64 / 129.54 + 2.5, and 0.04 + 2.5 at a stand
+    gap = SAFETY._replace(standstill_gap_m=2.5)
+    assert safe_distance_m(17.0, 20.0, gap) == close(3.4404169706572487)
+    assert safe_distance_m(0.0, 0.0, gap) == close(2.54)
+
+
 def test_eq_4_one_length_and_two_safe_distances():
     assert minimum_gap_m(5.0, 0.75) == close(6.5)
 
@@ -84,8 +91,18 @@ def test_merge_clearance_is_eq_1_where_a_time_gap_makes_it_larger():
     assert merge_clearance_m(RULES.road, SAFETY._replace(time_gap_s=0.5)) == close(10.14000012)
 
 
+def test_merge_clearance_is_eq_1_where_a_standstill_gap_makes_it_larger():
+    # 0.04 + 3e-9 * 40 + 2.5 + 0.1; 0.5 m leave Eq. 15 the larger, and Eq. 15 has no such gap
+    assert merge_clearance_m(RULES.road, SAFETY._replace(standstill_gap_m=2.5)) == close(2.64000012)
+    half = SAFETY._replace(standstill_gap_m=0.5)
+    assert merge_clearance_m(RULES.road, half) == merge_clearance_m(RULES.road, SAFETY)
+    assert merge_distance_m(ALONG_20, 20.0, half) == merge_distance_m(ALONG_20, 20.0, SAFETY)
+
+
 def test_following_clearance_is_eq_1_at_v0_with_the_allowance():
     assert following_clearance_m(RULES.road, SAFETY) == close(0.14000012)
+    gap = SAFETY._replace(time_gap_s=1.0, standstill_gap_m=2.5)
+    assert following_clearance_m(RULES.road, gap) == close(22.64000012)
 
 
 @pytest.mark.parametrize(
@@ -113,3 +130,5 @@ def test_standing_clearance_covers_the_whole_braking_and_no_more(
     )
     clearance_m = standing_clearance_m(RULES.road, safety, stop_mps2)
     assert clearance_m == pytest.approx(0.14 + asked.max(), abs=1e-7)
+    with_gap = safety._replace(standstill_gap_m=2.5)
+    assert standing_clearance_m(RULES.road, with_gap, stop_mps2) == close(clearance_m + 2.5)

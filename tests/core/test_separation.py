@@ -11,7 +11,9 @@ from coramp.core.separation import smallest_margin_m, smallest_of_quadratic
 from tests.core import SAFETY, close, pieces, random_pairs, sampled_margins, trajectories
 
 # errors large enough to be seen
-WIDE = SAFETY._replace(positioning_error_m=0.3, clock_error_s=0.05, time_gap_s=0.4)
+WIDE = SAFETY._replace(
+    positioning_error_m=0.3, clock_error_s=0.05, time_gap_s=0.4, standstill_gap_m=1.5
+)
 
 
 @pytest.mark.parametrize(

@@ -379,6 +379,45 @@ def test_tables_go_to_stdout_and_nothing_else_does(uncontrolled):
     assert f"Records are in {uncontrolled.folder}" in told.out
 
 
+ABOVE = ("run", "paper", "--engine", "exact", "--mainline", "2000", "--ramp", "700")
+GAPS = ("--set", "safety.time_gap_s=1.0", "--set", "safety.standstill_gap_m=2.5")
+
+
+def test_demand_above_the_lanes_limit_is_said_beforehand():
+    told = invoke(*ABOVE, *GAPS, "--horizon", "30")
+    line = (
+        "Note: 2,700 veh/h is above this lane's 2,605 (time gap 1 s, standstill gap 2.5 m): "
+        "queues will grow\n"
+    )
+    assert told.err == line
+    assert "2605" in told.out
+    as_json = invoke(*ABOVE, *GAPS, "--horizon", "30", "--json")
+    assert as_json.err == line
+    assert json.loads(as_json.out)["summary"]["lane_limit_veh_h"] == pytest.approx(2604.92)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (*ABOVE, "--set", "safety.time_gap_s=1.0"),  # 2,864 veh/h
+        ("run", "paper", *GAPS, "-s", "uncontrolled", "--mainline", "2000", "--ramp", "700"),
+    ],
+)
+def test_demand_is_not_spoken_of_below_the_limit_or_with_drivers(arguments):
+    assert invoke(*arguments, "--horizon", "10").err == ""
+
+
+def test_a_study_says_once_that_demand_is_above_the_limit(tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text(SMALL_STUDY + 'set = { "safety.time_gap_s" = [0.0, 3.0, 4.0] }\n')
+    told = invoke("study", str(path), "--engine", "exact", "--out", str(tmp_path / "out"))
+    (line,) = [line for line in told.err.splitlines() if "lane" in line]
+    assert line == (
+        "Note: 2 of 3 runs are above what their lane carries; such as 1,300 veh/h is above this "
+        "lane's 1,105 (time gap 3 s): queues will grow"
+    )
+
+
 def test_what_is_printed_is_what_was_measured(kept):
     told = invoke(*RUN)
     summary = kept.content["summary"]

@@ -80,6 +80,59 @@ def test_decisions_wait_for_every_vehicle_that_matters():
             assert f"{first:.1f} to {last:.1f} m" in message
 
 
+@pytest.mark.parametrize(
+    ("given", "key", "allowed"),
+    [
+        # the mainline has (-200 20/16 + 400) m, less lag, length, a step, 2 L_1, clock, allowance
+        ({"safety.time_gap_s": 8.0}, "safety.time_gap_s: 8 s", "6.045 s"),
+        ({"safety.time_gap_s": 6.05}, "safety.time_gap_s: 6.05 s", "6.045 s"),
+        (
+            {"safety.time_gap_s": 6.0, "safety.standstill_gap_m": 20.0},
+            "safety.time_gap_s: 6 s",
+            "5.045 s",
+        ),
+        (
+            {"safety.standstill_gap_m": 20.0, "ramp.decision_station_m": -290.0},
+            "safety.standstill_gap_m: 20 m",
+            "8.415 m",
+        ),
+    ],
+)
+def test_gaps_that_do_not_fit_the_road_are_refused_with_what_is_allowed(given, key, allowed):
+    (message,) = problems(given)
+    assert message.startswith(f"--set: {key} does not fit")
+    assert message.endswith(f"allowed is up to {allowed}")
+    changed, most = key.split(":")[0], float(allowed.split()[0])
+    assert load_scenario("paper", {**given, changed: most})
+
+
+def test_two_gaps_that_do_not_fit_either_are_both_refused():
+    given = {
+        "safety.time_gap_s": 0.8,
+        "safety.standstill_gap_m": 15.0,
+        "ramp.decision_station_m": -290.0,
+    }
+    first, second = problems(given)
+    assert first.startswith("--set: safety.time_gap_s: 0.8 s does not fit")
+    assert second.startswith("--set: safety.standstill_gap_m: 15 m does not fit")
+
+
+def test_errors_too_wide_for_the_road_are_not_blamed_on_the_gaps():
+    given = {"safety.positioning_error_m": 20.0, "mainline.start_m": -300.0}
+    (message,) = problems({**given, "safety.time_gap_s": 1.0})
+    assert message.startswith("paper: ramp.decision_station_m: ")
+
+
+@pytest.mark.parametrize(
+    ("value", "allowed"),
+    [(-1.0, "at least 0"), (20.5, "at most 20"), (math.nan, "a finite number")],
+)
+def test_standstill_gaps_have_bounds(value, allowed):
+    (message,) = problems({"safety.standstill_gap_m": value})
+    assert message.startswith("--set: safety.standstill_gap_m: ")
+    assert f"allowed is {allowed}" in message
+
+
 @given(st.sampled_from(NUMBERS), st.sampled_from([math.nan, math.inf, -math.inf]))
 def test_no_number_may_be_anything_but_finite(key, value):
     messages = problems({key: value})

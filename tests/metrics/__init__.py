@@ -26,6 +26,7 @@ class Car:
     merge_s: float = NEVER
     length_m: float = 5.0
     plan_error_m: float = NEVER
+    entry_speed_mps: float = 20.0
 
     @property
     def on_ramp(self):
@@ -62,6 +63,7 @@ def outcome_of(cars, end_s, **rest):
         on_ramp=on_ramp,
         length_m=column("length_m"),
         scheduled_s=column("scheduled_s"),
+        entry_speed_mps=column("entry_speed_mps"),
         entry_s=column("entry_s"),
         merge_s=np.where(on_ramp, column("merge_s"), -math.inf),
         exit_s=column("exit_s"),

@@ -8,9 +8,11 @@ from coramp.metrics.motion import (
     binned_motion,
     distance_of_each_m,
     fuel_of_each_l,
+    hard_brakings,
     hardest_braking_mps2,
     largest_jerk_mps3,
     pieces_of_samples,
+    stopped_vehicles,
 )
 
 CRUISE = (0.1569, 0.0245, -7.415e-4, 5.975e-5)  # Table 3, ml/s
@@ -177,3 +179,73 @@ def test_the_largest_jerk_is_that_of_close_sampling():
     found = largest_jerk_mps3(np.array([0, len(rows)]), rows, np.array([end_s]))
     assert found == pytest.approx(sampled, abs=5e-3)
     assert found >= sampled - 1e-9
+
+
+def braked(harder_than_mps2, *rows, until=100.0):
+    first, table = one(*rows)
+    return hard_brakings(first, table, np.array([float(until)]), harder_than_mps2)
+
+
+def test_a_hard_braking_is_one_however_its_deceleration_changes():
+    rows = (
+        (0.0, 0.0, 30.0, -3.5),
+        (0.1, 3.0, 29.6, -4.0),
+        (0.15, 4.5, 29.4, -5.0),
+        (0.4, 12.0, 28.0, 0.0),
+    )
+    assert braked(3.0, *rows) == 1
+    assert braked(4.5, *rows) == 1  # 0.25 s at -5
+    assert braked(5.0, *rows) == 0  # no harder than that
+
+
+def test_two_hard_brakings_with_a_pause_are_two_and_short_ones_are_none():
+    pause = (
+        (0.0, 0.0, 30.0, -4.0),
+        (0.2, 5.9, 29.2, -2.0),
+        (0.3, 8.8, 29.0, -4.0),
+        (0.6, 17.3, 27.8, 0.0),
+    )
+    assert braked(3.0, *pause) == 2
+    assert braked(3.0, *pause, until=0.4) == 1  # 0.1 s of the second
+    assert braked(3.0, (0.0, 0.0, 30.0, -4.0), (0.19, 5.6, 29.2, 0.0)) == 0
+
+
+def test_hard_brakings_of_all_vehicles_add_up_and_pieces_of_no_length_part_none():
+    rows = np.array(
+        [
+            (0.0, 0.0, 30.0, -4.0),
+            (0.1, 3.0, 29.6, 0.0),
+            (0.1, 3.0, 29.6, -4.0),
+            (0.3, 8.8, 28.8, 0.0),
+            (5.0, 0.0, 20.0, -3.1),
+        ]
+    )
+    assert hard_brakings(np.array([0, 4, 4, 5]), rows, np.array([9.0, 9.0, 6.0]), 3.0) == 2
+
+
+def stopped(merge_s, *rows, until=100.0, lane_end_m=200.0):
+    first, table = one(*rows)
+    return stopped_vehicles(first, table, np.array([float(until)]), np.array([merge_s]), lane_end_m)
+
+
+STAND = ((0.0, -100.0, 20.0, -2.0), (10.0, 0.0, 0.0, 0.0), (12.0, 0.0, 0.0, 2.0))
+
+
+def test_a_stop_counts_between_entry_and_merge():
+    assert stopped(15.0, *STAND) == 1
+    assert stopped(10.0, *STAND) == 1
+    assert stopped(9.9, *STAND) == 0  # 0.2 m/s then
+    assert stopped(np.nan, *STAND) == 1
+    assert stopped(np.nan, *STAND, until=9.9) == 0
+
+
+def test_a_mainline_vehicle_counts_up_to_the_end_of_the_acceleration_lane():
+    assert stopped(-np.inf, *STAND) == 1
+    assert stopped(-np.inf, *STAND, lane_end_m=0.0) == 1
+    assert stopped(-np.inf, *STAND, lane_end_m=-1.0) == 0  # at 2 m/s
+
+
+def test_stops_count_vehicles_and_not_moments():
+    rows = np.array([*STAND, (14.0, 4.0, 4.0, -2.0), (16.0, 8.0, 0.0, 0.0), (0.0, 0.0, 5.0, 0.0)])
+    first, until_s, merge_s = np.array([0, 5, 6, 6]), np.full(3, 30.0), np.array([20.0, 9.0, 9.0])
+    assert stopped_vehicles(first, rows, until_s, merge_s, 200.0) == 1

@@ -196,6 +196,19 @@ def test_capacity_has_a_line_a_combination_in_the_strategys_colour():
     assert axes.get_ylabel() == "mainline flow at breakdown (veh/h)"
 
 
+def test_capacity_shows_what_the_lane_carries_where_it_lies_within_the_range():
+    rows = []
+    for text, limit in ((None, 14008.0), ("safety.time_gap_s=1.0", 2864.0)):
+        for ramp in (200.0, 1000.0):
+            for flow, delay in ((1200.0, 0.1), (3000.0, 9.0)):
+                row = delays("mainline-priority", (flow, ramp), delay, 0.1)
+                rows.append({**row, "overrides": text, "lane_limit_veh_h": limit})
+    (axes,) = capacity_figure(runs_of(*rows)).axes
+    dotted = [line for line in axes.get_lines() if line.get_linestyle() == ":"]
+    assert [line.get_xydata().tolist() for line in dotted] == [[[200.0, 2664.0], [1000.0, 1864.0]]]
+    assert "lane: 2,864" in [text.get_text() for text in axes.texts]
+
+
 def test_failed_runs_are_not_drawn_in_capacity(runs):
     failed = runs.head(1).with_columns(status=pl.lit("failed"))
     assert capacity_figure(failed).axes[0].containers == []

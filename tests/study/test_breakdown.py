@@ -108,10 +108,27 @@ def test_the_table_has_means_and_says_what_lies_outside():
     assert table.rows == (
         (
             "mainline-priority, Eq. 1",
+            "-",
             "1550 ± 635; above 2000 (1 of 3 seeds)",
             "at or below 1000",
         ),
     )
+
+
+@pytest.mark.parametrize(
+    ("overrides", "name"),
+    [
+        (None, "mainline-priority, Eq. 1"),
+        ("safety.time_gap_s=0.6", "mainline-priority, 0.6 s"),
+        ("safety.standstill_gap_m=2.5 safety.time_gap_s=1.0", "mainline-priority, 1.0 s, 2.5 m"),
+        ("mainline.end_m=500.0", "mainline-priority, mainline.end_m=500.0"),
+    ],
+)
+def test_combinations_are_named_by_their_gaps(overrides, name):
+    given = {"overrides": overrides, "lane_limit_veh_h": 2604.9}
+    runs = runs_of(*({**row, **given} for row in rows(1, 1500.0)))
+    (table,) = capacity_tables(runs)
+    assert table.rows == ((name, "2605", "1500"),)
 
 
 def test_the_figure_has_a_line_for_each_combination():

@@ -23,6 +23,7 @@ class Bounds(NamedTuple):
     clock_error_s: float
     friction: float
     time_gap_s: float
+    standstill_gap_m: float
     allowance_m: float
     comfort_mps2: float
     ramp_acceleration_mps2: float
@@ -70,11 +71,12 @@ def passes_s(pieces: FloatArray, station_m: float) -> float:
 
 @kernel
 def following_distance_m(v_front: float, v_rear: float, bounds: Bounds) -> float:
-    """Returns 2 L_1 + L_2 + L_3 in m (Eq. 1-3, speeds in m/s), plus the optional time gap."""
+    """Returns 2 L_1 + L_2 + L_3 in m (Eq. 1-3, speeds in m/s), plus the optional gaps."""
     closing_km_h = 3.6 * (v_rear - v_front)
     braking_m = closing_km_h**2 / (254.0 * bounds.friction) if closing_km_h > 0.0 else 0.0
     clock_m = bounds.clock_error_s * (v_front + v_rear)
-    return 2.0 * bounds.positioning_error_m + clock_m + braking_m + bounds.time_gap_s * v_rear
+    by_paper_m = 2.0 * bounds.positioning_error_m + clock_m + braking_m
+    return by_paper_m + bounds.time_gap_s * v_rear + bounds.standstill_gap_m
 
 
 @kernel

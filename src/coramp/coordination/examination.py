@@ -30,6 +30,7 @@ def bounds_of(rules: Rules) -> Bounds:
         clock_error_s=safety.clock_error_s,
         friction=safety.adhesion + safety.resistance,
         time_gap_s=safety.time_gap_s,
+        standstill_gap_m=safety.standstill_gap_m,
         allowance_m=safety.execution_allowance_m,
         comfort_mps2=motion.comfort_mps2,
         ramp_acceleration_mps2=motion.ramp_acceleration_mps2,

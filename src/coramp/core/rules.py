@@ -31,8 +31,9 @@ class Road(NamedTuple):
 class SafetyBudget(NamedTuple):
     """The errors and road conditions that the safe distance of Eq. 1 is made of.
 
-    ``time_gap_s`` is an optional addition of ``time_gap_s`` times the follower's speed, 0 in the
-    paper. ``execution_allowance_m`` is what planning adds for each pair so that the driven
+    ``time_gap_s`` is an optional addition of ``time_gap_s`` times the follower's speed, and
+    ``standstill_gap_m`` one of so many metres at every speed; both are 0 in the paper.
+    ``execution_allowance_m`` is what planning adds for each pair so that the driven
     positions keep Eq. 1; it is no part of the safe distance itself.
     """
 
@@ -41,6 +42,7 @@ class SafetyBudget(NamedTuple):
     adhesion: float
     resistance: float
     time_gap_s: float
+    standstill_gap_m: float
     execution_allowance_m: float
 
 
@@ -100,7 +102,7 @@ def unpacked(numbers: FloatArray) -> Rules:
     n = numbers
     return Rules(
         Road(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10]),
-        SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16]),
-        MotionLimits(n[17], n[18], n[19], n[20], n[21], n[22], n[23], n[24]),
-        Control(n[25], n[26], n[27], n[28] != 0.0, n[29] != 0.0),
+        SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16], n[17]),
+        MotionLimits(n[18], n[19], n[20], n[21], n[22], n[23], n[24], n[25]),
+        Control(n[26], n[27], n[28], n[29] != 0.0, n[30] != 0.0),
     )

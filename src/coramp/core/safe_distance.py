@@ -40,7 +40,8 @@ def speed_difference_distance_m(
 def safe_distance_m(front_speed_mps: float, rear_speed_mps: float, safety: SafetyBudget) -> float:
     """Returns L_safe = 2 L_1 + L_2 + L_3 in m, bumper to bumper (Eq. 1).
 
-    A time gap in the budget adds ``time_gap v_rear``; the paper has none.
+    A time gap in the budget adds ``time_gap v_rear`` and a standstill gap itself; the paper has
+    neither.
     """
     return (
         2.0 * safety.positioning_error_m
@@ -49,6 +50,7 @@ def safe_distance_m(front_speed_mps: float, rear_speed_mps: float, safety: Safet
             front_speed_mps, rear_speed_mps, safety.adhesion, safety.resistance
         )
         + safety.time_gap_s * rear_speed_mps
+        + safety.standstill_gap_m
     )
 
 
@@ -115,10 +117,11 @@ def following_clearance_m(road: Road, safety: SafetyBudget) -> float:
 def standing_clearance_m(road: Road, safety: SafetyBudget, stop_mps2: float) -> float:
     """Returns the bumper distance (m) planned between two vehicles that stop one behind the other.
 
-    Eq. 1 at a stand, plus what a time gap and the clock error ask for on the way. Per m/s these are
-    ``T = time_gap + 2 clock_error`` at most. At speed v the follower is ``v^2 / (2 d)`` before its
-    stop and must keep ``v^2 / (2 g (phi + psi)) + T v`` from the vehicle that stands, so its stop
-    lies by the largest ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
+    Eq. 1 at a stand, the standstill gap with it, plus what a time gap and the clock error ask for
+    on the way. Per m/s these are ``T = time_gap + 2 clock_error`` at most. At speed v the follower
+    is ``v^2 / (2 d)`` before its stop and must keep ``v^2 / (2 g (phi + psi)) + T v`` from the
+    vehicle that stands, so its stop lies by the largest
+    ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
     """
     still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
     per_speed_s = safety.time_gap_s + 2.0 * safety.clock_error_s

@@ -86,6 +86,7 @@ def passages_of(
         np.array([arrival.on_ramp for arrival in arrivals], np.bool_),
         np.array([arrival.length_m for arrival in arrivals]),
         np.array([arrival.step * step_s for arrival in arrivals]),
+        np.array([arrival.speed_mps for arrival in arrivals]),
         entry_s,
         merge_s,
         exit_s,

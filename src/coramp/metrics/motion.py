@@ -6,10 +6,14 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.core.fuel import trajectory_fuel_l
-from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_end_s
+from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_end_s, time_at_station
 
 BIN_S = 1.0
 JERK_S = 1.0
+HARD_S = 0.2
+"""Braking shorter than this is no hard braking."""
+STOPPED_MPS = 0.1
+ROUNDING_S = 1e-6
 
 
 @kernel
@@ -75,6 +79,65 @@ def hardest_braking_mps2(rows: FloatArray) -> float:
     for k in range(len(rows)):
         hardest = max(hardest, -rows[k, ACCEL])
     return hardest
+
+
+@kernel
+def hard_brakings(
+    first: IntArray, rows: FloatArray, until_s: FloatArray, harder_than_mps2: float
+) -> int:
+    """Returns how often vehicles braked harder than that (m/s2, positive) for 0.2 s or longer.
+
+    One interval counts once however its deceleration changes; vehicles count up to ``until_s``.
+    """
+    found = 0
+    for i in range(len(until_s)):
+        own = rows[first[i] : first[i + 1]]
+        since_s = math.inf
+        for k in range(len(own)):
+            start_s = own[k, TIME]
+            end_s = min(until_s[i], piece_end_s(own, k))
+            if end_s <= start_s:
+                continue
+            if own[k, ACCEL] >= -harder_than_mps2:
+                since_s = math.inf
+                continue
+            counted = start_s - since_s >= HARD_S - ROUNDING_S
+            since_s = min(since_s, start_s)
+            if not counted and end_s - since_s >= HARD_S - ROUNDING_S:
+                found += 1
+    return found
+
+
+@kernel
+def stopped_vehicles(
+    first: IntArray,
+    rows: FloatArray,
+    until_s: FloatArray,
+    merge_s: FloatArray,
+    lane_end_m: float,
+) -> int:
+    """Returns how many vehicles were below 0.1 m/s between entry and merge.
+
+    ``merge_s`` is minus infinity for mainline vehicles, which count until they pass
+    ``lane_end_m``, and nan for who never merged, which counts up to ``until_s``.
+    """
+    found = 0
+    for i in range(len(until_s)):
+        own = rows[first[i] : first[i + 1]]
+        last_s = until_s[i]
+        if merge_s[i] == -math.inf:
+            last_s = min(last_s, time_at_station(own, lane_end_m))
+        elif merge_s[i] < last_s:
+            last_s = merge_s[i]
+        for k in range(len(own)):
+            start_s, end_s = own[k, TIME], min(last_s, piece_end_s(own, k))
+            if end_s < start_s:
+                break
+            end_mps = own[k, SPEED] + own[k, ACCEL] * (end_s - start_s)
+            if min(own[k, SPEED], end_mps) < STOPPED_MPS:
+                found += 1
+                break
+    return found
 
 
 @kernel

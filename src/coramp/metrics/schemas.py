@@ -4,7 +4,7 @@ import polars as pl
 
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 3
+RESULT_VERSION = 4
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -84,7 +84,7 @@ RUN_KEYS: Schema = {
 }
 """What runs are sorted by."""
 
-RUN_METRICS: Schema = {
+_FIRST_METRICS: Schema = {
     "vehicles_mainline": pl.Int64,
     "vehicles_ramp": pl.Int64,
     "unserved": pl.Int64,
@@ -116,16 +116,32 @@ RUN_METRICS: Schema = {
     "max_jerk_mps3": pl.Float64,
 }
 
+_LATER_METRICS: Schema = {
+    "delay_s": pl.Float64,
+    "delay_bound_s": pl.Float64,
+    "delay_bound_ratio": pl.Float64,
+    "mainline_fcfs_delay_s": pl.Float64,
+    "ramp_fcfs_delay_s": pl.Float64,
+    "lane_limit_veh_h": pl.Float64,
+    "hard_brakings_3": pl.Int64,
+    "hard_brakings_4_5": pl.Int64,
+    "stops": pl.Int64,
+}
+"""They stand at the end of ``runs.parquet``, so that what was there keeps its place."""
+
+RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS}
+
 RUNS: Schema = {
     "run_id": pl.String,
     **RUN_KEYS,
     "overrides": pl.String,
     "status": pl.String,
     "error": pl.String,
-    **RUN_METRICS,
+    **_FIRST_METRICS,
     "wall_s": pl.Float64,
     "planning_median_s": pl.Float64,
     "planning_p95_s": pl.Float64,
+    **_LATER_METRICS,
 }
 PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
 MEASURED = ("wall_s", *PLANNING_TIMES)

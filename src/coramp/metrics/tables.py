@@ -13,6 +13,7 @@ from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
 from coramp.metrics.fitting import fitted_pieces
+from coramp.metrics.lane_figures import bound_figures, braking_figures
 from coramp.metrics.lane_uses import lane_uses
 from coramp.metrics.motion import (
     BIN_S,
@@ -126,6 +127,8 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **_stream_metrics(streams),
         **safety_figures(outcome, scenario),
         **_decision_figures(outcome),
+        **bound_figures(outcome, scenario, vehicles["delay_s"], vehicles["free_flow_s"]),
+        **braking_figures(outcome, scenario),
     }
     return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 
@@ -139,7 +142,7 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
     passages, pieces = outcome.passages, outcome.pieces
     finished = ~np.isnan(passages.exit_s)
     entered = ~np.isnan(passages.entry_s)
-    until_s = np.where(finished, passages.exit_s, outcome.end_s)
+    until_s = outcome.until_s
     entry_s = np.where(entered, passages.entry_s, outcome.end_s)
     free_flow_s = np.where(
         passages.on_ramp, scenario.ramp_free_flow_s, scenario.mainline_free_flow_s
@@ -179,7 +182,7 @@ def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
 def speed_columns(outcome: Outcome) -> Columns:
     """Returns the space-mean speed of each stream in bins of 1 s, where there are vehicles."""
     passages, pieces = outcome.passages, outcome.pieces
-    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
+    until_s = outcome.until_s
     bins = math.ceil(outcome.end_s / BIN_S) + 1
     distance_m, time_s, vehicles = binned_motion(
         pieces.first, pieces.rows, until_s, passages.on_ramp, bins
@@ -306,9 +309,8 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
 
 
 def _largest_jerk_mps3(outcome: Outcome) -> float:
-    passages, pieces = outcome.passages, outcome.pieces
-    until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
-    return float(largest_jerk_mps3(pieces.first, pieces.rows, until_s))
+    pieces = outcome.pieces
+    return float(largest_jerk_mps3(pieces.first, pieces.rows, outcome.until_s))
 
 
 def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:

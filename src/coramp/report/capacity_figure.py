@@ -6,7 +6,7 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coramp.report.style import LINES, Look, grid, look_of, new_figure, save_figure
+from coramp.report.style import GREY, LINES, Look, grid, look_of, new_figure, save_figure
 from coramp.studies.capacity_layout import Breakdown, breakdowns
 
 
@@ -19,7 +19,8 @@ def capacity_figure(runs: pl.DataFrame) -> Figure:
     """Returns one line a combination: where it breaks down, with intervals over seeds.
 
     Colours and markers are those of the strategies, lines tell time gaps apart. Points at the
-    upper edge, with an arrow, did not break down within the range.
+    upper edge, with an arrow, did not break down within the range. Dotted: what the lane carries,
+    less the ramp flow, where that lies within the range.
     """
     found = breakdowns(runs.filter(status="ok"))
     figure = new_figure(8.6, 4.8)
@@ -31,6 +32,7 @@ def capacity_figure(runs: pl.DataFrame) -> Figure:
         number = gaps.index(line[0].overrides)
         label = name.removeprefix(line[0].strategy) if line[0].drivers is None else ""
         _draw(axes, look, line, f"{look.label}{label}", number)
+    _draw_limits(axes, found)
     axes.set(xlabel="ramp flow (veh/h)", ylabel="mainline flow at breakdown (veh/h)")
     grid(axes)
     if found:
@@ -61,6 +63,27 @@ def _draw(axes: Axes, look: Look, line: list[Breakdown], label: str, number: int
                 (ramp, middle),
                 arrowprops={"arrowstyle": "->", "color": look.colour},
             )
+
+
+def _draw_limits(axes: Axes, found: list[Breakdown]) -> None:
+    """One line a lane limit, named at its end."""
+    limits = sorted({b.limit_veh_h for b in found if b.limit_veh_h is not None}, reverse=True)
+    for limit in limits:
+        near = [b for b in found if b.limit_veh_h == limit]
+        ramps = sorted({b.ramp_veh_h for b in near})
+        if limit - ramps[0] > max(b.highest_veh_h for b in near):
+            continue
+        mainline = [limit - ramp for ramp in ramps]
+        axes.plot(ramps, mainline, color=GREY, linestyle=":", linewidth=1.2)
+        axes.annotate(
+            f"lane: {limit:,.0f}",
+            (ramps[-1], mainline[-1]),
+            textcoords="offset points",
+            xytext=(4, 0),
+            va="center",
+            color=GREY,
+            fontsize="small",
+        )
 
 
 def _middle(found: Breakdown) -> float:

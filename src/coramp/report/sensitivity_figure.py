@@ -19,6 +19,7 @@ KEYS = {
     "safety.clock_error_s": "clock error ε (s)",
     "safety.adhesion": "adhesion φ (no unit)",
     "safety.time_gap_s": "time gap (s)",
+    "safety.standstill_gap_m": "standstill gap (m)",
 }
 """What the keys of the built-in study are called; others keep their names."""
 Settings = list[tuple[float, str | None]]

@@ -10,6 +10,8 @@ from coramp.studies.breakdown import BREAKDOWN_DELAY_S, broke_down
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 
+UNITS = {"safety.time_gap_s": "s", "safety.standstill_gap_m": "m"}
+
 
 @dataclass(frozen=True)
 class Breakdown:
@@ -17,6 +19,7 @@ class Breakdown:
 
     ``flows`` are the lowest mainline flows (veh/h) that broke down, one a seed; ``above`` counts
     the seeds with which even the highest flow held, ``below`` those with which the lowest broke.
+    ``limit_veh_h`` is what the lane carries of both streams, None for drivers.
     """
 
     strategy: str
@@ -28,6 +31,7 @@ class Breakdown:
     below: int
     lowest_veh_h: float
     highest_veh_h: float
+    limit_veh_h: float | None = None
 
     @property
     def estimate(self) -> Estimate:
@@ -37,11 +41,20 @@ class Breakdown:
     @property
     def name(self) -> str:
         """The combination in words."""
-        gap = (self.overrides or "").removeprefix("safety.time_gap_s=")
+        gap = _gaps(self.overrides or "")
         who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
         if self.drivers:
             return who
-        return f"{who}, {gap} s" if gap else f"{who}, Eq. 1"
+        return f"{who}, {gap or 'Eq. 1'}"
+
+
+def _gaps(overrides: str) -> str:
+    """Overrides in words; gaps by their values alone."""
+    words = []
+    for override in overrides.split():
+        key, _, value = override.partition("=")
+        words.append(f"{value} {UNITS[key]}" if key in UNITS else override)
+    return ", ".join(sorted(words, key=lambda word: word.endswith(" m")))
 
 
 def breakdowns(good: pl.DataFrame) -> list[Breakdown]:
@@ -66,7 +79,19 @@ def _breakdown(
             above += 1
         else:
             flows.append(broken)
-    return Breakdown(strategy, drivers, overrides, ramp, tuple(flows), above, below, low, high)
+    limit_veh_h = group["lane_limit_veh_h"].max() if "lane_limit_veh_h" in group.columns else None
+    return Breakdown(
+        strategy,
+        drivers,
+        overrides,
+        ramp,
+        tuple(flows),
+        above,
+        below,
+        low,
+        high,
+        limit_veh_h if isinstance(limit_veh_h, float) else None,
+    )
 
 
 def _range(group: pl.DataFrame) -> tuple[float, float]:
@@ -87,8 +112,9 @@ def capacity_tables(good: pl.DataFrame) -> list[Table]:
     rows = []
     for name in dict.fromkeys(b.name for b in found):
         cells = {b.ramp_veh_h: _cell(b) for b in found if b.name == name}
-        rows.append((name, *(cells.get(ramp, "-") for ramp in ramps)))
-    columns = ("strategy, time gap", *(f"ramp {ramp:g}" for ramp in ramps))
+        limit = max((b.limit_veh_h or math.nan for b in found if b.name == name), default=None)
+        rows.append((name, number(limit, 0), *(cells.get(ramp, "-") for ramp in ramps)))
+    columns = ("strategy, gaps", "lane carries", *(f"ramp {ramp:g}" for ramp in ramps))
     meaning = (
         "Mainline flow (veh/h) from which on a stream loses more than "
         f"{BREAKDOWN_DELAY_S:g} s on average or anyone is left, by bisection for each seed: mean "
@@ -96,7 +122,12 @@ def capacity_tables(good: pl.DataFrame) -> list[Table]:
         "already at the lowest. Bisection takes it that what broke down at a flow does so at all "
         "higher ones."
     )
-    return [Table("Breakdown flow on the mainline (veh/h)", columns, tuple(rows), (meaning,))]
+    carried = (
+        "Lane carries: vehicles of both streams an hour at the gaps that are kept, 3600 / h; at a "
+        "ramp flow, that less the ramp flow is left for the mainline. A dash for drivers."
+    )
+    title = "Breakdown flow on the mainline (veh/h)"
+    return [Table(title, columns, tuple(rows), (meaning, carried))]
 
 
 def _cell(found: Breakdown) -> str:

@@ -90,6 +90,8 @@ def asked_table(run: ShownRun) -> Table:
 def _errors(positioning_error_m: float, run: ShownRun) -> str:
     safety = run.scenario.safety
     gap = f"; time gap {safety.time_gap_s:g} s" if safety.time_gap_s else ""
+    if safety.standstill_gap_m:
+        gap += f"; standstill gap {safety.standstill_gap_m:g} m"
     return f"{positioning_error_m:g} m, {safety.clock_error_s:g} s{gap}"
 
 
@@ -101,6 +103,17 @@ def answer(run: ShownRun) -> str:
     return (
         f"With {run.title}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s on "
         f"the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."
+        f"{_against_the_bound(row)}"
+    )
+
+
+def _against_the_bound(row: Row) -> str:
+    ratio = row.get("delay_bound_ratio")
+    if ratio is None:
+        return ""
+    return (
+        f" All together lose {number(row['delay_s'])} s, {number(ratio)} times the "
+        f"{number(row['delay_bound_s'])} s that the lane allows at best."
     )
 
 
@@ -134,12 +147,18 @@ def notes(run: ShownRun) -> list[str]:
 def comparison_table(runs: Sequence[ShownRun]) -> Table:
     """Returns the figures of runs side by side."""
     lines: list[tuple[str, str, int]] = [
+        ("delay of all, mean (s)", "delay_s", 2),
+        ("least delay that the lane allows, of all (s)", "delay_bound_s", 2),
+        ("delay over the least that the lane allows", "delay_bound_ratio", 2),
         ("mainline delay, mean (s)", "mainline_delay_s", 2),
         ("mainline delay, 95th percentile (s)", "mainline_delay_p95_s", 2),
         ("ramp delay, mean (s)", "ramp_delay_s", 2),
         ("ramp delay, 95th percentile (s)", "ramp_delay_p95_s", 2),
         ("mainline speed, mean (m/s)", "mainline_speed_mps", 2),
         ("ramp speed, mean (m/s)", "ramp_speed_mps", 2),
+        ("mainline delay, first come first served (s)", "mainline_fcfs_delay_s", 2),
+        ("ramp delay, first come first served (s)", "ramp_fcfs_delay_s", 2),
+        ("most that the lane carries (veh/h)", "lane_limit_veh_h", 0),
         ("fuel (l)", "fuel_l", 2),
         ("mainline vehicles", "vehicles_mainline", 0),
         ("ramp vehicles", "vehicles_ramp", 0),
@@ -149,13 +168,16 @@ def comparison_table(runs: Sequence[ShownRun]) -> Table:
         ("smallest margin over Eq. 1 (m)", "min_margin_m", 3),
         ("smallest time to collision (s)", "min_ttc_s", 2),
         ("hardest braking (m/s²)", "max_decel_mps2", 2),
+        ("brakings beyond 3 m/s²", "hard_brakings_3", 0),
+        ("brakings beyond 4.5 m/s²", "hard_brakings_4_5", 0),
+        ("vehicles that stopped on their way", "stops", 0),
         ("largest difference between plan and SUMO (m)", "plan_error_m", 4),
         *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
     ]
     rows = tuple(
-        (text, *(number(run.summary[key], digits) for run in runs))
+        (text, *(number(run.summary.get(key), digits) for run in runs))
         for text, key, digits in lines
-        if any(run.summary[key] is not None for run in runs)
+        if any(run.summary.get(key) is not None for run in runs)
     )
     return Table("Figures", ("what", *(run.title for run in runs)), rows)
 

@@ -73,12 +73,13 @@ coramp.situation = (run, time) => {
   return lanes;
 };
 
-// L_safe = 2 L_1 + L_2 + L_3 (Eq. 1 to 3), and the time gap where the scenario has one; in m.
+// L_safe = 2 L_1 + L_2 + L_3 (Eq. 1 to 3), and the time and standstill gaps of the scenario; in m.
 coramp.safeDistance = (run, frontSpeed, rearSpeed) => {
   const s = run.safety;
   const closing = 3.6 * Math.max(0, rearSpeed - frontSpeed);
   return 2 * s.positioning_error_m + s.clock_error_s * (frontSpeed + rearSpeed)
-    + (closing * closing) / (254 * (s.adhesion + s.resistance)) + s.time_gap_s * rearSpeed;
+    + (closing * closing) / (254 * (s.adhesion + s.resistance)) + s.time_gap_s * rearSpeed
+    + s.standstill_gap_m;
 };
 
 // How many are due but still outside.
