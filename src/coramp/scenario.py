@@ -102,6 +102,7 @@ class Motion(Model):
     free_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 2.0
     ramp_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 6.0
     speed_deviation: Annotated[float, Field(ge=0.0, le=0.5)] = 0.1
+    slow_deviation: Annotated[float, Field(ge=0.0, le=0.9)] | None = None
     slowest_ramp_speed_mps: Speed = 2.0
 
 
@@ -189,7 +190,10 @@ class Scenario(Model):
                 merge_angle_rad=math.radians(self.ramp.merge_angle_deg),
             ),
             SafetyBudget(**self.safety.model_dump()),
-            MotionLimits(stop_mps2=self.stop_mps2, **self.motion.model_dump()),
+            MotionLimits(
+                stop_mps2=self.stop_mps2,
+                **{**self.motion.model_dump(), "slow_deviation": self.slow_deviation},
+            ),
             Control(
                 step_s=self.control.step_s,
                 actuation_delay_s=self.control.actuation_delay_s,
@@ -249,6 +253,14 @@ class Scenario(Model):
         """
         grip_mps2 = 0.5 / braking_distance_m(1.0, self.safety.adhesion, self.safety.resistance)
         return min(self.motion.comfort_mps2, GRIP_SHARE * grip_mps2)
+
+    @property
+    def slow_deviation(self) -> float:
+        """Share of v0 by which a vehicle that makes a gap may fall below v0."""
+        given, deviation = self.motion.slow_deviation, self.motion.speed_deviation
+        if given is not None:
+            return given
+        return deviation
 
     @property
     def run_up_m(self) -> float:

@@ -200,7 +200,22 @@ def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
 @kernel
 def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
     """Rung delay: come late to a later gap that is large enough, as ``come_late`` does."""
-    return come_late(fleet, proposal, situation, gap, False, rules)
+    return come_late(fleet, proposal, situation, gap, 0.0, rules)
+
+
+@kernel
+def delay_and_create(
+    fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules
+) -> Merge:
+    """Rung delay with gap creation: come late to a gap whose rear vehicle falls back (scenario 2).
+
+    By no more than what the time gaps before and behind the subject ask for; the safe distances of
+    the paper alone leave gaps enough.
+    """
+    room_m = 2.0 * rules.safety.time_gap_s * rules.road.mainline_speed_mps
+    if room_m <= 0.0:
+        return no_merge()
+    return come_late(fleet, proposal, situation, gap, room_m, rules)
 
 
 @kernel
@@ -209,20 +224,22 @@ def come_late(
     proposal: Proposal,
     situation: Situation,
     gap: int,
-    make_room: bool,
+    room_m: float,
     rules: Rules,
 ) -> Merge:
     """Slow down on the ramp at once so as to end at the front of a later gap.
 
     The subject passes the nose late, at the ramp's speed, and accelerates as in free movement.
-    Vehicles behind it on the ramp brake where they would come too near. With ``make_room`` the
-    vehicle behind a gap that is too small falls back by what is missing, with its cascade.
+    Vehicles behind it on the ramp brake where they would come too near. The vehicle behind a gap
+    that is too small falls back by what is missing, up to ``room_m``, with its cascade.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
     target_m = min(high_m, situation.free_m)
     back_m = max(0.0, low_m - target_m)
+    if back_m > room_m:
+        return no_merge()
     if back_m > 0.0 and (
-        not make_room or gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
+        gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
     ):
         return no_merge()
     road, motion = rules.road, rules.motion
