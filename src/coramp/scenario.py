@@ -22,6 +22,10 @@ SIGNAL_STATION_M = -60.0
 REACTION_S = 1.0
 LONGEST_STEP_S = 0.25
 """Up to here SUMO was seen to stay within 5 cm of the plan; the error grows with the square."""
+SLOWER_PER_TIME_GAP_PS = 4.0
+"""By how many times ``speed_deviation`` a gap maker may be slower still, a second of time gap."""
+SLOWEST_DEVIATION = 0.5
+"""Slower still gains nothing: flows at breakdown are the same, and the mainline loses more."""
 GRIP_SHARE = 0.95
 """Of the braking that Eq. 3 allows, what stops before the nose use."""
 
@@ -256,11 +260,15 @@ class Scenario(Model):
 
     @property
     def slow_deviation(self) -> float:
-        """Share of v0 by which a vehicle that makes a gap may fall below v0."""
-        given, deviation = self.motion.slow_deviation, self.motion.speed_deviation
-        if given is not None:
-            return given
-        return deviation
+        """Share of v0 by which a vehicle that makes a gap may fall below v0, as given or as fits.
+
+        Room for one vehicle takes the way of a time gap more than by the paper's distances.
+        """
+        if self.motion.slow_deviation is not None:
+            return self.motion.slow_deviation
+        deviation = self.motion.speed_deviation
+        wider = deviation * (1.0 + SLOWER_PER_TIME_GAP_PS * self.safety.time_gap_s)
+        return max(deviation, min(wider, SLOWEST_DEVIATION))
 
     @property
     def run_up_m(self) -> float:
