@@ -22,6 +22,10 @@ SIGNAL_STATION_M = -60.0
 REACTION_S = 1.0
 LONGEST_STEP_S = 0.25
 """Up to here SUMO was seen to stay within 5 cm of the plan; the error grows with the square."""
+SLOWER_PER_TIME_GAP_PS = 4.0
+"""By how many times ``speed_deviation`` a gap maker may be slower still, a second of time gap."""
+SLOWEST_DEVIATION = 0.5
+"""Slower still gains nothing: flows at breakdown are the same, and the mainline loses more."""
 GRIP_SHARE = 0.95
 """Of the braking that Eq. 3 allows, what stops before the nose use."""
 
@@ -103,6 +107,7 @@ class Motion(Model):
     free_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 2.0
     ramp_acceleration_mps2: Annotated[float, Field(gt=0.0, le=10.0)] = 6.0
     speed_deviation: Annotated[float, Field(ge=0.0, le=0.5)] = 0.1
+    slow_deviation: Annotated[float, Field(ge=0.0, le=0.9)] | None = None
     slowest_ramp_speed_mps: Speed = 2.0
 
 
@@ -190,7 +195,10 @@ class Scenario(Model):
                 merge_angle_rad=math.radians(self.ramp.merge_angle_deg),
             ),
             SafetyBudget(**self.safety.model_dump()),
-            MotionLimits(stop_mps2=self.stop_mps2, **self.motion.model_dump()),
+            MotionLimits(
+                stop_mps2=self.stop_mps2,
+                **{**self.motion.model_dump(), "slow_deviation": self.slow_deviation},
+            ),
             Control(
                 step_s=self.control.step_s,
                 actuation_delay_s=self.control.actuation_delay_s,
@@ -250,6 +258,18 @@ class Scenario(Model):
         """
         grip_mps2 = 0.5 / braking_distance_m(1.0, self.safety.adhesion, self.safety.resistance)
         return min(self.motion.comfort_mps2, GRIP_SHARE * grip_mps2)
+
+    @property
+    def slow_deviation(self) -> float:
+        """Share of v0 by which a vehicle that makes a gap may fall below v0, as given or as fits.
+
+        Room for one vehicle takes the way of a time gap more than by the paper's distances.
+        """
+        if self.motion.slow_deviation is not None:
+            return self.motion.slow_deviation
+        deviation = self.motion.speed_deviation
+        wider = deviation * (1.0 + SLOWER_PER_TIME_GAP_PS * self.safety.time_gap_s)
+        return max(deviation, min(wider, SLOWEST_DEVIATION))
 
     @property
     def run_up_m(self) -> float:

@@ -31,6 +31,7 @@ MOTION = MotionLimits(
     free_acceleration_mps2=2.0,
     speed_deviation=0.1,
     slowest_ramp_speed_mps=2.0,
+    slow_deviation=0.1,
 )
 RULES = Rules(
     Road(

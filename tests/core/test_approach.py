@@ -16,6 +16,7 @@ from coramp.core.approach import (
     change_speed,
     harmonise,
     late_approach,
+    late_start,
     stop_of_m,
     stop_starts_s,
 )
@@ -175,6 +176,32 @@ def test_late_approach_cannot_be_early_or_slower_than_the_slowest():
     latest = _written(late_approach, 0.0, -147.0, 16.0, latest_s - 1e-3, ROAD, MOTION)
     assert latest[-1] == pytest.approx(np.array([latest_s - 1e-3, 0.0, 16.0, 0.0]), abs=1e-6)
     assert len(_written(late_approach, 0.0, -147.0, 16.0, latest_s + 1e-3, ROAD, MOTION)) == 0
+
+
+def test_late_start_by_hand():
+    # 2 s after it has come to its stop, 10 m before the nose: 10 = 0.75 t^2
+    way = _written(late_start, STOPPING, 1.0, 2.0, ROAD, MOTION)
+    off_s = math.sqrt(10.0 / 0.75)
+    expected = [
+        [1.0, -144.0, 16.0, 0.0],
+        [6.175, -61.2, 16.0, -2.5],
+        [12.575, -10.0, 0.0, 0.0],
+        [14.575, -10.0, 0.0, 1.5],
+        [14.575 + off_s, 0.0, 1.5 * off_s, 0.0],
+    ]
+    assert way == close(np.array(expected))
+    # one that stands already waits from now on
+    way = _written(late_start, STOPPING, 20.0, 2.0, ROAD, MOTION)
+    expected = [
+        [20.0, -10.0, 0.0, 0.0],
+        [22.0, -10.0, 0.0, 1.5],
+        [22.0 + off_s, 0.0, 1.5 * off_s, 0.0],
+    ]
+    assert way == close(np.array(expected))
+
+
+def test_late_start_needs_a_stop():
+    assert len(_written(late_start, pieces(0.0, -160.0, 16.0), 1.0, 2.0, ROAD, MOTION)) == 0
 
 
 def test_late_approach_needs_a_way_to_the_ramp_s_speed():

@@ -81,6 +81,54 @@ def test_shift_keeps_the_bounds_on_acceleration_and_speed(lasts_s, most_m, side)
     assert _shift(_stream(10.0), 0, 0.0, lasts_s, side * (most_m + 1e-3)) is None
 
 
+SLOW = RULES._replace(motion=RULES.motion._replace(slow_deviation=0.5))
+"""Down to 10 m/s, up to 22 m/s."""
+
+
+@pytest.mark.parametrize(
+    ("lasts_s", "back_m", "ahead_m"),
+    [
+        (10.0, 50.0, 10.0),  # half of 10 m/s, of 2 m/s, for 10 s
+        (4.0, 11.76, 4.0),  # 2.94 m/s2 for 2 s, twice; half of 2 m/s for 4 s
+        (1.0, 0.735, 0.735),
+    ],
+)
+def test_shift_back_may_be_slower_than_one_ahead_is_fast(lasts_s, back_m, ahead_m):
+    fleet = _stream(10.0)
+    for most_m, side in ((back_m, -1.0), (ahead_m, 1.0)):
+        for more_m in (-1e-3, 1e-3):
+            proposal = empty_proposal()
+            shift_m = side * (most_m + more_m)
+            done = propose_shift(fleet, proposal, 0, 0.0, 0.0, lasts_s, shift_m, SLOW)
+            assert done == (more_m < 0.0)
+            speeds = proposal.pieces[0, : proposal.piece_count[0], 2] if done else np.array([20.0])
+            assert 10.0 <= speeds.min() <= speeds.max() <= 22.0
+
+
+def test_shifts_back_one_upon_the_other_keep_the_lower_bound_together():
+    # 7 m/s below v0 after 3 s, again at v0 after 6 s: a second one may take 3 m/s more, 9 m
+    once = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 3.0), (20.0, 3.0)]), STREAM, True))
+    for shift_m, possible in ((-1.8, True), (-2.0, False)):  # 7/3 m/s2 leave 0.607: 1.82 m/s
+        done = propose_shift(once, empty_proposal(), 0, 0.0, 0.0, 6.0, 3.0 * shift_m, SLOW)
+        assert done == possible
+    # over 20 s the accelerations would do: 10 m/s are what binds
+    gently = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 10.0), (20.0, 10.0)]), STREAM, True))
+    for shift_m, possible in ((-29.9, True), (-30.1, False)):
+        done = propose_shift(gently, empty_proposal(), 0, 0.0, 0.0, 20.0, shift_m, SLOW)
+        assert done == possible
+
+
+def test_cascade_back_may_be_slow_and_one_ahead_not_fast():
+    order = np.array([0, 1, 2])
+    fleet = _stream(*THREE)
+    proposal = empty_proposal()
+    assert push_back(fleet, proposal, order, 0, 0.0, 0.0, 14.0, 25.0, SLOW)
+    moved_m = [_moved_m(proposal, fleet, entry) for entry in range(3)]
+    assert moved_m == close([-25.0, -25.0 + 4.85999988, -25.0 + 2 * 4.85999988])
+    assert not push_back(fleet, empty_proposal(), order, 0, 0.0, 0.0, 14.0, 25.0, RULES)
+    assert not push_ahead(fleet, empty_proposal(), order, 2, 0.0, 0.0, 14.0, 25.0, SLOW)
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_shifts_one_upon_the_other_keep_the_bounds_together(side):
     # 1.5 m/s off v0 after 3 s, again at v0 after 6 s: a second one may add 0.5 m/s

@@ -23,6 +23,7 @@ DIMENSIONLESS = {
     "mass_ratio",
     "log10_mass_ratio",
     "speed_deviation",
+    "slow_deviation",
     "mainline_occupancy",
     "queue_occupancy",
 }

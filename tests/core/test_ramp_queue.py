@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from coramp.core.approach import append_stop, harmonise
 from coramp.core.fleet import MAX_CHANGED, empty_proposal, pair_margin_m
-from coramp.core.ramp_queue import next_behind_on_ramp, propose_place_ahead, propose_stop
+from coramp.core.ramp_queue import (
+    longest_wait_s,
+    next_behind_on_ramp,
+    propose_place_ahead,
+    propose_stop,
+)
 from tests.core import RULES, close, fleet_of, pieces, sampled
 
 UNDECIDED = math.inf
@@ -108,6 +113,46 @@ def test_vehicle_about_to_merge_is_kept_away_from_until_then():
     free = empty_proposal()
     assert propose_stop(gone, free, 1, -1.0, 0.0, RULES)
     assert _proposed(free)[0, 3] == 0.0
+
+
+def standing(station_m):
+    return pieces(0.0, station_m, 0.0)
+
+
+def test_vehicle_of_a_queue_that_starts_waits_until_the_time_gap_has_come_about():
+    # the leader starts at 0 s: 0.75 t^2, at 16 m/s from 10.667 s on. 3.74 m behind it, w seconds
+    # later, the distance at 16 m/s is 3.74 + 16 w, and 0.14 + 1 * 16 m are to be kept: w >= 0.775 s
+    rules = RULES._replace(safety=RULES.safety._replace(time_gap_s=1.0, clock_error_s=0.0))
+    start_s = 16.0 / 1.5
+    cruise_s = (329.0 - 0.75 * start_s**2 - 51.2) / 16.0
+    leader = pieces(0.0, -330.0, 0.0, [(16.0, start_s), (16.0, cruise_s), (0.0, 6.4)])
+    assert leader[-1, 1] == close(-1.0)
+    fleet = fleet_of((leader, UNDECIDED, True), (standing(-338.74), UNDECIDED, True))
+    proposal = empty_proposal()
+    assert propose_place_ahead(fleet, proposal, 1, -40.0, 0.0, rules)
+    expected = [
+        [0.0, -338.74, 0.0, 0.0],
+        [0.8, -338.74, 0.0, 1.5],
+        [0.8 + start_s, -338.74 + 0.75 * start_s**2, 16.0, 0.0],
+    ]
+    assert _proposed(proposal)[:3] == close(np.array(expected))
+    assert _proposed(proposal)[-1, 1:3].tolist() == [-40.0, 0.0]
+    margin_m = pair_margin_m(leader, 5.0, math.inf, _proposed(proposal), 5.0, math.inf, 0.0, rules)
+    assert margin_m == close(0.1 + 0.4)  # 16 (0.8 - 0.775)
+
+
+def test_vehicle_of_a_queue_behind_one_that_stands_for_ever_stays():
+    for time_gap_s in (0.0, 1.0):
+        rules = RULES._replace(safety=RULES.safety._replace(time_gap_s=time_gap_s))
+        fleet = fleet_of((standing(-100.0), UNDECIDED, True), (standing(-108.74), UNDECIDED, True))
+        proposal = empty_proposal()
+        assert not propose_place_ahead(fleet, proposal, 1, -9.0, 0.0, rules)
+        assert proposal.size[0] == 0
+
+
+def test_nobody_waits_where_the_distances_of_eq_1_are_all():
+    assert longest_wait_s(RULES.safety) == 0.0
+    assert longest_wait_s(RULES.safety._replace(time_gap_s=0.6)) == close(19.2)  # 32 vehicles
 
 
 def test_place_ahead_drives_on_as_committed_and_leaves_out_the_old_stop():

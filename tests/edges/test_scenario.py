@@ -63,6 +63,21 @@ def test_the_stop_moves_back_where_the_lane_is_too_short_to_start_from_the_nose(
     assert f"up to {-missing:g} m" in message
 
 
+def test_how_slow_a_gap_maker_may_be_fits_the_time_gap():
+    def slow(**overrides):
+        overrides = {key.replace("__", "."): value for key, value in overrides.items()}
+        return load_scenario("paper", overrides).rules().motion.slow_deviation
+
+    assert slow() == 0.1
+    assert slow(motion__speed_deviation=0.2) == 0.2
+    assert slow(safety__time_gap_s=0.6) == pytest.approx(0.34)  # 0.1 (1 + 4 * 0.6)
+    assert slow(safety__time_gap_s=1.0) == pytest.approx(0.5)
+    assert slow(safety__time_gap_s=1.4) == 0.5
+    assert slow(safety__time_gap_s=1.4, motion__speed_deviation=0.0) == 0.0
+    assert slow(safety__time_gap_s=1.0, motion__slow_deviation=0.2) == 0.2
+    assert slow(motion__slow_deviation=0.7) == 0.7
+
+
 def test_decisions_wait_for_every_vehicle_that_matters():
     least = (20.0**2 - 16.0**2) / (2.0 * 197.5)
     lag = (20.0 - 16.0) ** 2 / (2.0 * least)

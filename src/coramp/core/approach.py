@@ -154,6 +154,28 @@ def late_approach(
 
 
 @kernel
+def late_start(
+    pieces: FloatArray,
+    from_s: float,
+    wait_s: float,
+    road: Road,
+    motion: MotionLimits,
+    out: FloatArray,
+) -> int:
+    """Writes a ramp vehicle's way to the nose that goes on to its stop, stands, and starts again.
+
+    It stands for ``wait_s`` from when it has come to its stop, or from ``from_s`` if it has by then.
+    Returns 0 for a commitment that does not end in a stand.
+    """
+    if pieces[len(pieces) - 1, SPEED] > 0.0:
+        return 0
+    n = clip_start(pieces, from_s, out)
+    n = drive(out, n, 0.0, wait_s)
+    n = change_speed(out, n, road.ramp_speed_mps, motion)
+    return clip_end(out, n, time_at_station(out[:n], 0.0))
+
+
+@kernel
 def _distance_between_speeds_m(slow_mps: float, fast_mps: float, rate_mps2: float) -> float:
     return 0.5 * (fast_mps * fast_mps - slow_mps * slow_mps) / rate_mps2
 

@@ -169,7 +169,8 @@ def largest_shift_m(
 ) -> float:
     """Returns the largest |shift| (m) in a time, from Eq. 42 and 45 and the bounds on both.
 
-    |a| <= ``most_mps2`` and |v_t - v_0| <= ``speed_deviation`` v_0.
+    |a| <= ``most_mps2`` and |v_t - v_0| <= ``speed_deviation`` v_0, the deviation in the direction
+    of the shift.
     """
     if duration_s <= 0.0:
         return 0.0

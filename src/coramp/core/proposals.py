@@ -76,7 +76,8 @@ def propose_shift(
     v0 = rules.road.mainline_speed_mps
     motion = rules.motion
     duration_s = window_end_s - start_s
-    if abs(shift_m) > largest_shift_m(v0, duration_s, motion.comfort_mps2, motion.speed_deviation):
+    deviation = motion.speed_deviation if shift_m >= 0.0 else motion.slow_deviation
+    if abs(shift_m) > largest_shift_m(v0, duration_s, motion.comfort_mps2, deviation):
         return False
     before = committed(fleet, row)
     n = superpose_shift(before, from_s, start_s, window_end_s, shift_m, proposal.pieces[entry])
@@ -87,7 +88,7 @@ def propose_shift(
     lowest, highest = speed_range_mps(after, from_s)
     if highest > max(old_highest, (1.0 + motion.speed_deviation) * v0) + ROUNDING_M:
         return False
-    if lowest < min(old_lowest, (1.0 - motion.speed_deviation) * v0) - ROUNDING_M:
+    if lowest < min(old_lowest, (1.0 - motion.slow_deviation) * v0) - ROUNDING_M:
         return False
     if largest_acceleration_mps2(after, from_s) > max(
         motion.comfort_mps2, largest_acceleration_mps2(before, from_s)

@@ -17,7 +17,7 @@ from coramp.core.fleet import (
     pair_margin_m,
     trajectory_under,
 )
-from coramp.core.rules import Rules
+from coramp.core.rules import Rules, SafetyBudget
 from coramp.core.trajectory import station_and_speed
 
 
@@ -28,7 +28,8 @@ def propose_stop(
     """Adds a ramp vehicle that goes on to a stop at ``stop_m``, braking before that if it must.
 
     It brakes for the least number of steps with which it keeps its distance from everyone ahead on
-    the ramp. Returns False, and adds nothing, where none is enough or the stop is too near.
+    the ramp; one that stands, or comes to a stand, waits. Returns False, and adds nothing, where
+    the longest wait is not enough or the stop is too near.
     """
     entry = proposal.size[0]
     if is_full(proposal):
@@ -37,7 +38,9 @@ def propose_stop(
     station_m, speed_mps = station_and_speed(before, from_s)
     out = proposal.pieces[entry]
     step_s = rules.control.step_s
-    most = math.ceil(speed_mps / rules.motion.slow_down_mps2 / step_s)
+    most = math.ceil(
+        (speed_mps / rules.motion.slow_down_mps2 + longest_wait_s(rules.safety)) / step_s
+    )
     too_short, enough, steps = -1, most + 1, 0
     while enough - too_short > 1:
         n = _stop_after_brake(out, from_s, station_m, speed_mps, steps * step_s, stop_m, rules)
@@ -51,6 +54,16 @@ def propose_stop(
     n = _stop_after_brake(out, from_s, station_m, speed_mps, enough * step_s, stop_m, rules)
     _add_stop(proposal, row, n)
     return True
+
+
+@kernel
+def longest_wait_s(safety: SafetyBudget) -> float:
+    """Returns for how long (s) a vehicle in a queue may have to stand until it can go on.
+
+    In a queue that starts, each vehicle follows the way of the one ahead a time gap later. By the
+    distances of Eq. 1 alone all can start at once.
+    """
+    return MAX_CHANGED * safety.time_gap_s
 
 
 @kernel

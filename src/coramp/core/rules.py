@@ -53,7 +53,8 @@ class MotionLimits(NamedTuple):
     ``comfort_mps2`` (0.3 g) binds everyone but a ramp vehicle that speeds up, which is bound by
     ``ramp_acceleration_mps2`` (6). ``stop_mps2`` is the braking towards a stop before the nose.
     ``free_acceleration_mps2`` is that
-    of free movement (Eq. 12). ``speed_deviation`` is a fraction of v0.
+    of free movement (Eq. 12). ``speed_deviation`` is how far above v0, ``slow_deviation`` how far
+    below it a vehicle that makes a gap may drive, both as fractions of v0.
     """
 
     speed_up_mps2: float
@@ -64,6 +65,7 @@ class MotionLimits(NamedTuple):
     free_acceleration_mps2: float
     speed_deviation: float
     slowest_ramp_speed_mps: float
+    slow_deviation: float
 
 
 class Control(NamedTuple):
@@ -103,6 +105,6 @@ def unpacked(numbers: FloatArray) -> Rules:
     return Rules(
         Road(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10]),
         SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16], n[17]),
-        MotionLimits(n[18], n[19], n[20], n[21], n[22], n[23], n[24], n[25]),
-        Control(n[26], n[27], n[28], n[29] != 0.0, n[30] != 0.0),
+        MotionLimits(n[18], n[19], n[20], n[21], n[22], n[23], n[24], n[25], n[26]),
+        Control(n[27], n[28], n[29], n[30] != 0.0, n[31] != 0.0),
     )

@@ -153,7 +153,7 @@ class LeastEffort:
         out = np.empty((MAX_PIECES, 4))
         n = superpose(committed(fleet, row), from_s, start_s, until_s, extra_mps2, out)
         pieces = out[:n]
-        slowest = (1.0 - rules.motion.speed_deviation) * rules.road.mainline_speed_mps
+        slowest = (1.0 - rules.motion.slow_deviation) * rules.road.mainline_speed_mps
         hardest_mps2 = np.abs(pieces[:, 3]).max(initial=0.0)
         if n == 0 or pieces[:, 2].min() < min(slowest, station_and_speed(pieces, from_s)[1]):
             return None

@@ -17,6 +17,7 @@ from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.rungs import (
     Merge,
     delay,
+    delay_and_create,
     merge_at,
     merge_freely,
     no_merge,
@@ -121,6 +122,12 @@ def first_that_helps(
         if merge.gap >= 0:
             return plan_of(
                 fleet, proposal, situation, merge, RUNG_DELAY, 0, conflict, rules
+            ), proposal
+    for gap in range(len(situation.order) + 1):
+        merge = delay_and_create(fleet, proposal, situation, gap, rules)
+        if merge.gap >= 0:
+            return plan_of(
+                fleet, proposal, situation, merge, RUNG_DELAY, 2, conflict, rules
             ), proposal
     proposal.size[0] = 0
     return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coramp._kernel import kernel
-from coramp.core.approach import late_approach, stop_of_m
+from coramp._kernel import FloatArray, kernel
+from coramp.core.approach import late_approach, late_start, stop_of_m
 from coramp.core.fleet import (
     ROUNDING_M,
     Fleet,
@@ -27,7 +27,7 @@ from coramp.core.proposals import (
     push_back,
 )
 from coramp.core.ramp_acceleration import acceleration_for_lag_mps2, lag_m
-from coramp.core.ramp_queue import next_behind_on_ramp, propose_stop
+from coramp.core.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
 from coramp.core.rules import Rules
 from coramp.core.trajectory import MAX_PIECES, station_and_speed
 from coramp.strategies.situation import (
@@ -200,7 +200,22 @@ def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
 @kernel
 def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
     """Rung delay: come late to a later gap that is large enough, as ``come_late`` does."""
-    return come_late(fleet, proposal, situation, gap, False, rules)
+    return come_late(fleet, proposal, situation, gap, 0.0, rules)
+
+
+@kernel
+def delay_and_create(
+    fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules
+) -> Merge:
+    """Rung delay with gap creation: come late to a gap whose rear vehicle falls back (scenario 2).
+
+    By no more than what the time gaps before and behind the subject ask for; the safe distances of
+    the paper alone leave gaps enough.
+    """
+    room_m = 2.0 * rules.safety.time_gap_s * rules.road.mainline_speed_mps
+    if room_m <= 0.0:
+        return no_merge()
+    return come_late(fleet, proposal, situation, gap, room_m, rules)
 
 
 @kernel
@@ -209,44 +224,32 @@ def come_late(
     proposal: Proposal,
     situation: Situation,
     gap: int,
-    make_room: bool,
+    room_m: float,
     rules: Rules,
 ) -> Merge:
-    """Slow down on the ramp at once so as to end at the front of a later gap.
+    """Slow down on the ramp at once, or start late, so as to end at the front of a later gap.
 
-    The subject passes the nose late, at the ramp's speed, and accelerates as in free movement.
-    Vehicles behind it on the ramp brake where they would come too near. With ``make_room`` the
-    vehicle behind a gap that is too small falls back by what is missing, with its cascade.
+    The subject passes the nose late, as ``late_way`` does, and accelerates as in free movement.
+    Vehicles behind it on the ramp brake where they would come too near. The vehicle behind a gap
+    that is too small falls back by what is missing, up to ``room_m``, with its cascade.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
     target_m = min(high_m, situation.free_m)
     back_m = max(0.0, low_m - target_m)
+    if back_m > room_m:
+        return no_merge()
     if back_m > 0.0 and (
-        not make_room or gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
+        gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
     ):
         return no_merge()
-    road, motion = rules.road, rules.motion
-    v0 = road.mainline_speed_mps
-    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
-    lag = lag_m(v0, road.ramp_speed_mps, motion.free_acceleration_mps2)
     buffer = np.empty((MAX_PIECES, 4))
-    n = late_approach(
-        situation.from_s, station_m, speed_mps, -(target_m + lag) / v0, road, motion, buffer
-    )
+    n = late_way(fleet, situation, target_m, rules, buffer)
     if n == 0:
         return no_merge()
-    later = situation_from(
-        situation.subject,
-        situation.from_s,
-        buffer[:n],
-        situation.known_m,
-        situation.order,
-        situation.intercepts_m,
-        rules,
-    )
+    later = with_approach(situation, buffer[:n], rules)
     accel_mps2 = later.free_accel_mps2
     merge_s, merge_m = propose_merge(proposal, later.subject, later.approach, accel_mps2, rules)
-    if merge_m > road.last_merge_station_m + ROUNDING_M:
+    if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
         return no_merge()
     if not delay_followers(fleet, proposal, situation, rules):
         return no_merge()
@@ -266,6 +269,50 @@ def come_late(
     if unsafe >= 0:
         return no_merge()
     return Merge(gap, accel_mps2, merge_s, merge_m, back_m)
+
+
+@kernel
+def late_way(
+    fleet: Fleet, situation: Situation, target_m: float, rules: Rules, out: FloatArray
+) -> int:
+    """Writes the subject's way to the nose with which free movement ends at ``target_m``.
+
+    It slows down at once and passes the nose at the ramp's speed. Where that cannot be, as for a
+    vehicle of a queue, it goes on to its stop, stands, and starts in time; for no longer than a
+    vehicle in a queue may have to stand. Returns the number of pieces, 0 where there is no such
+    way.
+    """
+    road, motion, from_s = rules.road, rules.motion, situation.from_s
+    v0 = road.mainline_speed_mps
+    before = committed(fleet, situation.subject)
+    station_m, speed_mps = station_and_speed(before, from_s)
+    lag = lag_m(v0, road.ramp_speed_mps, motion.free_acceleration_mps2)
+    nose_s = -(target_m + lag) / v0
+    n = late_approach(from_s, station_m, speed_mps, nose_s, road, motion, out)
+    longest_s = longest_wait_s(rules.safety)
+    if n > 0 or longest_s <= 0.0:
+        return n
+    n = late_start(before, from_s, 0.0, road, motion, out)
+    if n == 0:
+        return 0
+    wait_s = (with_approach(situation, out[:n], rules).free_m - target_m) / v0
+    if not 0.0 < wait_s <= longest_s:
+        return 0
+    return late_start(before, from_s, wait_s, road, motion, out)
+
+
+@kernel
+def with_approach(situation: Situation, approach: FloatArray, rules: Rules) -> Situation:
+    """Returns the situation of the same subject if it comes to the nose by ``approach``."""
+    return situation_from(
+        situation.subject,
+        situation.from_s,
+        approach,
+        situation.known_m,
+        situation.order,
+        situation.intercepts_m,
+        rules,
+    )
 
 
 @kernel

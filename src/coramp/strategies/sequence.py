@@ -159,10 +159,10 @@ def plan_in_gaps(
             if merge.gap < 0:
                 rung, scenario = RUNG_CREATE, moves
                 merge = create(fleet, proposal, situation, gap, moves, rules)
-        for make_room in (False, True):
+        for room_m in (0.0, np.inf):
             if merge.gap < 0:
-                rung, scenario = RUNG_DELAY, 2 if make_room else 0
-                merge = come_late(fleet, proposal, situation, gap, make_room, rules)
+                rung, scenario = RUNG_DELAY, 2 if room_m > 0.0 else 0
+                merge = come_late(fleet, proposal, situation, gap, room_m, rules)
         if merge.gap >= 0:
             plan = plan_of(fleet, proposal, situation, merge, rung, scenario, conflict, rules)
             return plan, proposal, blocked, behind

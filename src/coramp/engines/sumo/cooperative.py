@@ -17,7 +17,7 @@ from coramp.engines.sumo.commands import ON_GRID, command_table, correction
 from coramp.engines.sumo.demand import cooperative_type
 from coramp.engines.sumo.session import Session
 
-SPEED, MERGE, MEASURE = 0, 1, 2
+SPEED, MERGE, MEASURE, LOOK = range(4)
 CORRECT_FROM_M = 0.015
 """A vehicle this far off its plan is brought back."""
 SAME_SPEED_MPS = 1e-6
@@ -133,6 +133,8 @@ class CooperativePlant:
             self._command_speed(step, vehicle, following)
         elif kind == MERGE:
             self._merge(step, vehicle, following)
+        elif kind == LOOK:
+            self._session.act_now(vehicle.vehicle_id)
         else:
             planned_m, _ = station_and_speed(following.pieces, step * self._step_s)
             self._measure(vehicle, planned_m)
@@ -196,6 +198,8 @@ class CooperativePlant:
         lane, _ = self._session.lane_and_position_m(vehicle.vehicle_id)
         if lane == "merge_0":
             self._session.change_lane(vehicle.vehicle_id, 1)
+            # until it acts, it goes by the lane that it has left, and stops dead where that ends
+            self._push(step + 1, LOOK, following)
         else:  # the first step's travel behind the nose: the lane begins only now
             self._push(step + 1, MERGE, following)
 

@@ -101,7 +101,7 @@ class Session:
         """Commands a speed from now on."""
         _check_speed(vehicle_id, speed_mps)
         libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
-        self._act_now(vehicle_id)
+        self.act_now(vehicle_id)
 
     def change_speed(self, vehicle_id: str, speed_mps: float, steps: int) -> None:
         """Commands an even change to a speed over a number of steps."""
@@ -109,12 +109,12 @@ class Session:
         if steps < 1:
             raise CorampError(f"SUMO: {vehicle_id}: cannot change speed over {steps} steps")
         libsumo.vehicle.slowDown(vehicle_id, speed_mps, steps * self._step_s)
-        self._act_now(vehicle_id)
+        self.act_now(vehicle_id)
 
     def change_lane(self, vehicle_id: str, lane: int) -> None:
         """Commands a lane change at the end of the next step."""
         libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
-        self._act_now(vehicle_id)
+        self.act_now(vehicle_id)
 
     def set_signal(self, signal: str, lane: str, colour: str) -> None:
         """Sets the links of a signal that come from ``lane``; all others stay green."""
@@ -133,7 +133,8 @@ class Session:
         """Returns who is on a lane now."""
         return set(libsumo.lane.getLastStepVehicleIDs(lane))
 
-    def _act_now(self, vehicle_id: str) -> None:
+    def act_now(self, vehicle_id: str) -> None:
+        """Lets a vehicle act in the next step: it looks anew at the lanes before it."""
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
 
     def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
