@@ -4,7 +4,7 @@ import polars as pl
 
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 3
+RESULT_VERSION = 4
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -114,6 +114,9 @@ RUN_METRICS: Schema = {
     "refused_plans": pl.Int64,
     "interventions": pl.Int64,
     "max_jerk_mps3": pl.Float64,
+    "breakdown_time_s": pl.Float64,
+    "prebreakdown_flow_veh_h": pl.Float64,
+    "discharge_flow_veh_h": pl.Float64,
 }
 
 RUNS: Schema = {

@@ -21,6 +21,7 @@ from coramp.metrics.motion import (
     hardest_braking_mps2,
     largest_jerk_mps3,
 )
+from coramp.metrics.queues import queue_figures
 from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS, Schema
 from coramp.metrics.separations import (
     DRAC,
@@ -126,6 +127,7 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **_stream_metrics(streams),
         **safety_figures(outcome, scenario),
         **_decision_figures(outcome),
+        **queue_figures(outcome, scenario),
     }
     return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 
