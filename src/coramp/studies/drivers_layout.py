@@ -10,18 +10,20 @@ from coramp.studies.tables import Table, number, with_interval
 
 START = "mainline.start_m"
 BEFORE, AFTER = "prebreakdown_flow_veh_h", "discharge_flow_veh_h"
+MERGES = (
+    "17 merges in the USA, per lane, at a breakdown probability of 15 %; three, four, five lanes"
+)
 ROADS = (
-    (
-        "17 merges in the USA, 15 % probability of breakdown, per lane, unmetered: three, four, "
-        "five lanes",
-        "2048, 1959, 1745",
-        "",
-        "Asgharzadeh and Kondyli 2019, arXiv:1907.09606",
-    ),
-    ("the same, metered: three, four lanes", "2248, 2132", "", "the same"),
+    (MERGES, "2048, 1959, 1745", "", "Asgharzadeh and Kondyli 2019, arXiv:1907.09606"),
+    ("the same with ramp metering; three, four lanes", "2248, 2132", "", "the same"),
     ("two bottlenecks near Toronto", "", "about 10", "Cassidy and Bertini 1999"),
-    ("three bottlenecks of different kinds", "", "3 to 18", "Chung et al. 2007, second hand"),
-    ("three bottlenecks", "", "none", "Anderson and Davis 2020"),
+    ("three bottlenecks", "", "3 to 18", "Chung et al. 2007, at second hand"),
+    ("three bottlenecks in California", "", "none", "Anderson and Davis 2020"),
+)
+NOTE = (
+    "Means over the seeds that broke down, with 95 % intervals. Breakdown: mean speed at the "
+    "loop upstream at least 25 % below v0 for 15 min; before: flow at the zone's end over the "
+    "15 min until then; discharge: the same over all intervals of 5 min with a queue."
 )
 
 
@@ -44,13 +46,8 @@ def drivers_tables(good: pl.DataFrame) -> list[Table]:
         "lowest and highest drop (%)",
         "collisions",
     )
-    notes = (
-        "Means over the seeds that broke down, with 95 % intervals. Breakdown: mean speed at the "
-        "loop upstream at least 25 % below v0 for 15 min; before: flow at the zone's end over the "
-        "15 min until then; discharge: the same over all intervals of 5 min with a queue.",
-    )
     roads = Table("Measured roads", ("where", "flow before (pc/h)", "drop (%)", "source"), ROADS)
-    return [Table("Breakdown of each population", columns, rows, notes), roads]
+    return [Table("Breakdown of each population", columns, rows, (NOTE,)), roads]
 
 
 def _row(start_m: float, name: str, runs: list[dict[str, Any]]) -> tuple[str, ...]:

@@ -67,7 +67,9 @@ def driver_routes(
                 name += f"-{own.tau_s!r}"
         size = f'length="{arrival.length_m!r}" {_wish(drivers, wish_mps)}'
         types[name] = f'  <vType id="{name}" {size} {_manners(drivers, own.tau_s)}/>'
-        vehicles.append(_vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor))
+        vehicles.append(
+            _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
+        )
     return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
 
 
