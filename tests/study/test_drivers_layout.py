@@ -38,17 +38,17 @@ def test_flows_and_drops_by_hand():
     )
     table, roads = drivers_tables(runs)
     assert [r[:3] for r in table.rows] == [
-        ("400", "fair", "1 of 1"),
         ("1500", "credible", "3 of 4"),
         ("1500", "fair", "0 of 1"),
+        ("400", "fair", "1 of 1"),
     ]
-    credible = table.rows[1]
+    credible = table.rows[0]
     assert credible[3] == "2050 ± 635"  # t of one degree of freedom, 12.706, times 50
     assert credible[4].startswith("1898 ± ")
     assert credible[5].startswith("7.5 ± ")
     assert credible[6:] == ("5.0 to 10.0", "2")
-    assert table.rows[0][3:7] == ("2500", "2600", "-4.0", "-4.0 to -4.0")
-    assert table.rows[2][3:7] == ("-", "-", "-", "-")
+    assert table.rows[1][3:7] == ("-", "-", "-", "-")
+    assert table.rows[2][3:7] == ("2500", "2600", "-4.0", "-4.0 to -4.0")
     assert any("1907.09606" in cell for r in roads.rows for cell in r)
 
 
