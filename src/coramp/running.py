@@ -22,6 +22,7 @@ from coramp.metrics.tables import Row, RunTables, tables_of
 from coramp.scenario import Scenario
 from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
+from coramp.toml_files import key_parts
 
 ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
@@ -150,7 +151,7 @@ def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, A
 
 
 def _looked_up(data: Any, dotted: str) -> Any:
-    for part in dotted.split("."):
+    for part in key_parts(data, dotted):
         data = data.get(part) if isinstance(data, dict) else None
     return data
 

@@ -5,9 +5,9 @@ work together. ``--set key=value`` takes the same dotted keys.
 """
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from coramp.core.conflict_risk import GRAVITY_MPS2
 from coramp.core.ramp_acceleration import lag_m
@@ -45,7 +45,11 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Mainline(Model):
-    """The mainline lane of the control zone; station 0 is the end of the ramp."""
+    """The mainline lane of the control zone; station 0 is the end of the ramp.
+
+    With ``flow_to_veh_h`` the flow changes evenly, from ``flow_veh_h`` at the start to it at the
+    horizon.
+    """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
     end_m: Annotated[float, Field(gt=0.0, le=20000.0)]
@@ -53,6 +57,7 @@ class Mainline(Model):
     limit_mps: Speed
     entry_speed_mps: SpeedRange
     flow_veh_h: Flow
+    flow_to_veh_h: Flow | None = None
     min_headway_s: Headway
 
 
@@ -64,6 +69,7 @@ class Ramp(Model):
     mainline's loop for ramp metering; left out, it is three quarters along the lane.
     ``signal_station_m`` is that of its stop line; left out, it is 60 m before the nose, or a
     quarter of a shorter ramp, so that who was stopped can speed up before it merges.
+    ``flow_to_veh_h`` is as on the mainline.
     """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
@@ -71,6 +77,7 @@ class Ramp(Model):
     limit_mps: Speed
     entry_speed_mps: SpeedRange
     flow_veh_h: Flow
+    flow_to_veh_h: Flow | None = None
     min_headway_s: Headway
     acceleration_lane_m: Annotated[float, Field(gt=0.0, le=5000.0)]
     merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
@@ -121,20 +128,50 @@ class Controller(Model):
     gap_creation_start: Literal["decision", "nose"] = "decision"
 
 
+class SpeedFactor(Model):
+    """A normal distribution, cut off at both ends, of what drivers wish over the common speed."""
+
+    mean: Annotated[float, Field(gt=0.0, le=2.0)]
+    deviation: Annotated[float, Field(gt=0.0, le=1.0)]
+    low: Annotated[float, Field(gt=0.0, le=2.0)]
+    high: Annotated[float, Field(gt=0.0, le=2.0)]
+
+
+def _one_or_list(value: Any) -> str:
+    return "(list)" if isinstance(value, list | tuple) else "(one)"
+
+
+DriverGap = Annotated[float, Field(gt=0.0, le=10.0)]
+DriverGaps = Annotated[
+    Annotated[DriverGap, Tag("(one)")]
+    | Annotated[tuple[DriverGap, ...], Field(strict=False, min_length=1), Tag("(list)")],
+    Discriminator(_one_or_list),
+]
+
+
 class Drivers(Model):
     """A population of ordinary drivers for uncontrolled runs, in SUMO's terms.
 
     ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and
-    v0 from there on. ``car_following`` is SUMO's model; ``sigma`` counts for Krauss alone.
+    v0 from there on, times its ``speed_factor`` if there is one. ``tau_s`` is one time gap for
+    all, or a list of equally likely ones. ``accel_mps2`` is SUMO's own if left out.
+    ``car_following`` is SUMO's model; ``sigma`` counts for Krauss alone.
     """
 
     wish: Literal["entry-speed", "free-flow"]
+    speed_factor: SpeedFactor | None = None
+    accel_mps2: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
     sigma: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    tau_s: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    tau_s: DriverGaps = 1.0
     min_gap_m: Annotated[float, Field(ge=0.0, le=20.0)] = 2.5
     lc_cooperative: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
-    car_following: Literal["Krauss", "IDM", "ACC", "CACC"] = "Krauss"
+    car_following: Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"] = "Krauss"
     integrator: Literal["euler", "ballistic"] = "euler"
+
+    @property
+    def taus_s(self) -> tuple[float, ...]:
+        """The time gaps that drivers keep, equally likely."""
+        return self.tau_s if isinstance(self.tau_s, tuple) else (self.tau_s,)
 
 
 class ExplicitArrival(Model):

@@ -21,6 +21,7 @@ def problems_of(scenario: "Scenario") -> list[str]:
     """Returns a line ``key: what is wrong; what is allowed`` for all that does not fit."""
     problems = [*_speed_problems(scenario), *_place_problems(scenario), *_flow_problems(scenario)]
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
+    problems += _driver_problems(scenario)
     return problems or _planning_problems(scenario)
 
 
@@ -77,11 +78,13 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
     problems = []
     for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
         most = 3600.0 / stream.min_headway_s
-        if stream.flow_veh_h >= most:
-            problems.append(
-                f"{name}.flow_veh_h: {stream.flow_veh_h:g} cannot arrive with headways of "
-                f"{stream.min_headway_s:g} s or more; allowed is below {most:g} veh/h"
-            )
+        flows = (("flow_veh_h", stream.flow_veh_h), ("flow_to_veh_h", stream.flow_to_veh_h))
+        problems += [
+            f"{name}.{key}: {flow:g} cannot arrive with headways of "
+            f"{stream.min_headway_s:g} s or more; allowed is below {most:g} veh/h"
+            for key, flow in flows
+            if flow is not None and flow >= most
+        ]
     last_s: dict[str, float] = {}
     for number, arrival in enumerate(scenario.arrivals):
         key = f"arrivals.{number}"
@@ -141,6 +144,26 @@ def _strategy_problems(scenario: "Scenario") -> list[str]:
             continue
         wrong = wrong_settings(found, settings) or wrong_together(found, settings)
         problems += [f"strategy.{name}.{line}" for line in wrong]
+    return problems
+
+
+def _driver_problems(scenario: "Scenario") -> list[str]:
+    """A speed factor must hold its mean, and needs a common speed to be a factor of."""
+    problems = []
+    for name, drivers in scenario.drivers.items():
+        key, factor = f"drivers.{name}.speed_factor", drivers.speed_factor
+        if factor is None:
+            continue
+        if drivers.wish != "free-flow":
+            problems.append(
+                f"{key}: each wishes the speed that it entered with; "
+                f'allowed with drivers.{name}.wish "free-flow" alone'
+            )
+        if not factor.low <= factor.mean <= factor.high:
+            problems.append(
+                f"{key}: {factor.mean:g} is not between low and high; "
+                f"allowed are low <= mean <= high"
+            )
     return problems
 
 

@@ -15,6 +15,8 @@ from coramp.errors import CorampError
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
 Data = dict[str, Any]
 KINDS = ("scenarios", "snapshots", "studies")
+SHAPES = ("(one)", "(list)")
+"""Tags of a value that may be one or a list; they are no part of its key."""
 
 
 def builtin_names(kind: str) -> list[str]:
@@ -102,7 +104,7 @@ def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[st
     """Returns a copy of the data with dotted keys set; ``origins`` says who set each."""
     result = _copied(data)
     for dotted, value in overrides.items():
-        *parents, last = dotted.split(".")
+        *parents, last = key_parts(data, dotted)
         table = result
         for parent in parents:
             table = table.setdefault(parent, {})
@@ -111,6 +113,18 @@ def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[st
                 raise CorampError(_blamed(line, origins[dotted]))
         table[last] = value
     return result
+
+
+def key_parts(data: Any, dotted: str) -> list[str]:
+    """Returns the parts of a dotted key; names that are there may hold dots of their own."""
+    if isinstance(data, dict):
+        known = [name for name in data if dotted == name or dotted.startswith(f"{name}.")]
+        if known:
+            name = max(known, key=len)
+            rest = dotted.removeprefix(name).removeprefix(".")
+            return [name, *(key_parts(data[name], rest) if rest else ())]
+    first, _, rest = dotted.partition(".")
+    return [first, *(key_parts(None, rest) if rest else ())]
 
 
 def _copied(data: Data) -> Data:
@@ -161,7 +175,7 @@ def _causes(error: ValidationError) -> list[Any]:
 def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
     if problem["type"] == "value_error":
         return str(problem["ctx"]["error"]).splitlines()
-    key = ".".join(str(part) for part in problem["loc"])
+    key = ".".join(str(part) for part in problem["loc"] if part not in SHAPES)
     value, context = problem["input"], problem.get("ctx", {})
     shown = f"{value:g}" if isinstance(value, float) else repr(value)
     match problem["type"]:

@@ -4,7 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import coramp
-from coramp.arrivals import arrival_times_s, arrivals_of, generator
+from coramp.arrivals import (
+    arrival_times_s,
+    arrivals_of,
+    changing_arrival_times_s,
+    generator,
+)
 from coramp.loading import load_scenario
 
 STEP_S = 0.1
@@ -205,3 +210,53 @@ def test_every_strategy_meets_the_same_vehicles():
         pieces = runs[strategy].trajectories
         entered = pieces.sort("time_s").unique("vehicle_id", keep="first")
         assert dict(entered.select("vehicle_id", "speed_mps").rows()) == expected
+
+
+RISING = {"ramp__flow_veh_h": 300.0, "ramp__flow_to_veh_h": 1500.0}
+
+
+def test_a_rising_flow_shifts_nothing_of_the_other_stream():
+    changed = arrivals(**RISING)
+    assert of_stream(changed, on_ramp=False) == of_stream(arrivals(), on_ramp=False)
+    assert arrivals(**RISING) == changed
+
+
+@given(flows, flows, headway_steps, seeds)
+def test_headways_of_a_changing_flow_keep_their_minimum_on_the_grid(one, other, steps, seed):
+    times_s = changing_arrival_times_s(
+        (one, other), steps * STEP_S, 900.0, STEP_S, generator(seed, "arrivals/x")
+    )
+    on_grid = times_s / STEP_S
+    assert np.abs(on_grid - np.round(on_grid)).max(initial=0.0) < 1e-6
+    assert np.diff(np.round(on_grid)).min(initial=np.inf) >= steps
+    if len(times_s):
+        assert times_s[0] >= steps * STEP_S - 1e-9
+        assert times_s[-1] < 900.0
+
+
+def test_a_flow_that_changes_to_itself_has_the_headways_of_a_constant_one():
+    times_s = changing_arrival_times_s(
+        (1800.0, 1800.0), 0.6, 80000.0, 0.05, generator(7, "arrivals/x")
+    )
+    extra_s = np.diff(times_s) - 0.6
+    assert extra_s.mean() == pytest.approx(1.4, rel=0.02)
+    assert extra_s.std() == pytest.approx(1.4, rel=0.03)
+    assert np.quantile(extra_s, 0.5) == pytest.approx(1.4 * np.log(2.0), rel=0.05)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 1800.0), (300.0, 2700.0), (2400.0, 0.0)])
+def test_a_changing_flow_is_at_each_time_what_the_line_says(ends):
+    horizon_s, parts, draws = 3600.0, 6, 60
+    counts = np.zeros(parts)
+    for seed in range(draws):
+        times_s = changing_arrival_times_s(
+            ends, 0.6, horizon_s, STEP_S, generator(seed, "arrivals/x")
+        )
+        counts += np.histogram(times_s, parts, (0.0, horizon_s))[0]
+    middles = (np.arange(parts) + 0.5) / parts
+    expected = (ends[0] + (ends[1] - ends[0]) * middles) * horizon_s / parts / 3600.0
+    assert counts / draws == pytest.approx(expected, rel=0.04, abs=2.0)
+
+
+def test_nobody_comes_of_a_flow_that_stays_at_nothing():
+    assert not of_stream(arrivals(ramp__flow_veh_h=0.0, ramp__flow_to_veh_h=0.0), on_ramp=True)

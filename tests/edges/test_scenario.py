@@ -25,6 +25,7 @@ def number_keys(data, prefix=""):
 
 
 NUMBERS = sorted(number_keys(PAPER.model_dump(mode="json")))
+ONE_OR_MANY = [key for key in NUMBERS if key.endswith(".tau_s")]
 
 
 def problems(overrides, name="paper"):
@@ -155,7 +156,10 @@ def test_no_number_may_be_anything_but_finite(key, value):
     assert f"{key}: {value:g} is not finite; allowed is a finite number" in messages[0]
 
 
-@given(st.sampled_from(NUMBERS), st.sampled_from(["fast", True, [1.0], {"a": 1.0}]))
+@given(
+    st.sampled_from([key for key in NUMBERS if key not in ONE_OR_MANY]),
+    st.sampled_from(["fast", True, [1.0], {"a": 1.0}]),
+)
 def test_no_number_may_be_anything_else(key, value):
     messages = problems({key: value})
     assert len(messages) == 1

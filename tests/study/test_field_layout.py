@@ -10,7 +10,8 @@ from coramp.report.baseline_figure import baseline_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.front_figure import front_figure
 from coramp.strategies.registry import strategies
-from coramp.studies.baseline_layout import baseline_tables, settings_of
+from coramp.studies.baseline_layout import baseline_tables
+from coramp.studies.baseline_runs import settings_of
 from coramp.studies.definition import count_runs, expand, load_study
 from coramp.studies.field_layout import (
     METRICS,
@@ -159,6 +160,11 @@ def baseline_rows():
         ("uncontrolled", "fair", "drivers.fair.sigma=0.0 ramp.acceleration_lane_m=120.0", 5.0),
         ("uncontrolled", "paper", "drivers.paper.integrator=ballistic", 0.05),
         ("uncontrolled", "fair", "drivers.fair.car_following=ACC drivers.fair.tau_s=0.6", 8.0),
+        ("uncontrolled", "automated-0.6", None, 0.3),
+        ("uncontrolled", "automated-0.6", "drivers.automated-0.6.lc_cooperative=0.0", 0.8),
+        ("uncontrolled", "automated-0.8", None, 0.6),
+        ("uncontrolled", "fair", "drivers.fair.tau_s=0.6", 1.4),
+        ("uncontrolled", "credible", None, 20.0),
     ]
     return runs_of(
         *(
@@ -171,6 +177,7 @@ def baseline_rows():
                 vehicles_ramp=100,
                 mainline_delay_s=delay_s,
                 ramp_delay_s=delay_s / 2.0,
+                breakdown_time_s=900.0 if drivers == "credible" else None,
             )
             for strategy, drivers, overrides, delay_s in made
         )
@@ -185,7 +192,7 @@ def test_settings_are_the_scenarios_but_for_the_overrides():
 
 
 def test_the_rate_against_each_baseline_by_hand():
-    rates, gaps = baseline_tables(baseline_rows())
+    rates, gaps, as_they_are = baseline_tables(baseline_rows())
     assert rates.columns[5:] == ("1800 + 500: D_k (s)", "1800 + 500: I_r (%)")
     assert rates.rows == (
         ("fair", "120", "euler", "0", "1", "5.00", "90.0"),
@@ -196,8 +203,47 @@ def test_the_rate_against_each_baseline_by_hand():
     assert gaps.rows == (
         ("Eq. 1", "coordinated, mainline-priority", "0.20 / 0.10"),
         ("0.6", "uncoordinated ACC", "8.00 / 4.00"),
+        ("0.6", "automated Krauss, sigma 0, making room", "0.30 / 0.15"),
+        ("0.6", "automated Krauss, sigma 0, making no room", "0.80 / 0.40"),
+        ("0.6", "drivers, Krauss, sigma 0.5", "1.40 / 0.70"),
         ("0.6", "coordinated, mainline-priority", "0.40 / 0.20"),
+        ("0.8", "automated Krauss, sigma 0, making room", "0.60 / 0.30"),
     )
+    assert as_they_are.rows == (
+        ("fair", "2.00 / 1.00"),
+        ("credible", "20.00 / 10.00, b 1 of 1"),
+        ("credible-uniform", "-"),
+    )
+
+
+def test_equal_distances_are_time_gap_and_standstill_gap_together():
+    flow = (1800.0, 500.0)
+    apart = "safety.standstill_gap_m=2.5 safety.time_gap_s=0.6"
+    made = [
+        ("mainline-priority", None, "safety.time_gap_s=0.6", 0.4),
+        ("mainline-priority", None, apart, 0.9),
+        ("fifo-optimal-control", None, apart, 0.7),
+        ("uncontrolled", "automated-0.6", None, 0.3),
+        ("uncontrolled", "automated-0.8", None, 0.6),
+        ("uncontrolled", "fair", "drivers.fair.tau_s=0.6", 1.4),
+        ("uncontrolled", "fair", "drivers.fair.min_gap_m=1.0 drivers.fair.tau_s=0.6", 1.2),
+    ]
+    gaps, distances = baseline_tables(
+        runs_of(
+            *(
+                run_row(s, *flow, drivers=d, overrides=o, mainline_delay_s=x, ramp_delay_s=x)
+                for s, d, o, x in made
+            )
+        )
+    )
+    assert distances.rows == (
+        ("0.6 s, 2.5 m", "automated Krauss, sigma 0, making room", "0.30 / 0.30"),
+        ("0.6 s, 2.5 m", "drivers, Krauss, sigma 0.5", "1.40 / 1.40"),
+        ("0.6 s, 2.5 m", "coordinated, fifo-optimal-control", "0.70 / 0.70"),
+        ("0.6 s, 2.5 m", "coordinated, mainline-priority", "0.90 / 0.90"),
+    )
+    assert ("0.6", "coordinated, mainline-priority", "0.40 / 0.40") in gaps.rows
+    assert not any("0.90" in cell for row in gaps.rows for cell in row)
 
 
 def test_collisions_and_the_unserved_stand_beside_the_delay():
@@ -205,10 +251,10 @@ def test_collisions_and_the_unserved_stand_beside_the_delay():
     rows = baseline_rows().with_columns(
         collisions=told.then(7).otherwise(0), unserved=told.then(3).otherwise(0)
     )
-    rates, gaps = baseline_tables(rows)
+    rates, gaps, _ = baseline_tables(rows)
     assert rates.rows[0][5] == "5.00, u 3, c 7"
     assert gaps.rows[1][2] == "8.00 / 4.00, u 3, c 7"
-    assert gaps.rows[2][2] == "0.40 / 0.20"
+    assert gaps.rows[5][2] == "0.40 / 0.20"
 
 
 def test_the_figure_of_the_baseline_draws_every_baseline():
@@ -228,7 +274,15 @@ def test_tables_of_nothing_are_empty():
 def test_the_baseline_study_has_all_combinations():
     study = load_study("baseline")
     drivers = [s for s in expand(study, 1) if s.drivers is not None]
-    krauss = [s for s in drivers if s.scenario.drivers[s.drivers].car_following == "Krauss"]
-    assert len(krauss) == 2 * 2 * 2 * 2 * 3 * 3
-    assert len(drivers) - len(krauss) == 2 * 3 * 4
+    settings = [(s.drivers, s.scenario.drivers[s.drivers]) for s in drivers]
+    own = [d for name, d in settings if name in ("paper", "fair") and d.car_following == "Krauss"]
+    plain = [d for d in own if d.tau_s == 1.0]
+    # every baseline at three flows, and fair drivers once more at a fourth
+    assert len(plain) == 2 * 2 * 2 * 2 * 3 * 3 + 1
+    assert len(own) - len(plain) == 2 * 4  # fair drivers at 0.6 and 1.4 s
+    assert sum(d.car_following != "Krauss" for _, d in settings) == 2 * 3 * 4
+    automated = [(name, d.lc_cooperative) for name, d in settings if name.startswith("auto")]
+    assert len(automated) == 3 * 2 * 4
+    assert len(set(automated)) == 3 * 2
+    assert sum(name.startswith("credible") for name, _ in settings) == 2 * 4
     assert not math.isnan(count_runs(study, 3))

@@ -126,6 +126,9 @@ _LATER_METRICS: Schema = {
     "hard_brakings_3": pl.Int64,
     "hard_brakings_4_5": pl.Int64,
     "stops": pl.Int64,
+    "breakdown_time_s": pl.Float64,
+    "prebreakdown_flow_veh_h": pl.Float64,
+    "discharge_flow_veh_h": pl.Float64,
 }
 """They stand at the end of ``runs.parquet``, so that what was there keeps its place."""
 

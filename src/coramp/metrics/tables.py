@@ -22,6 +22,7 @@ from coramp.metrics.motion import (
     hardest_braking_mps2,
     largest_jerk_mps3,
 )
+from coramp.metrics.queues import queue_figures
 from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS, Schema
 from coramp.metrics.separations import (
     DRAC,
@@ -129,6 +130,7 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **_decision_figures(outcome),
         **bound_figures(outcome, scenario, vehicles["delay_s"], vehicles["free_flow_s"]),
         **braking_figures(outcome, scenario),
+        **queue_figures(outcome, scenario),
     }
     return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 

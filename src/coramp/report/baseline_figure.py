@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from coramp.report.style import (
     BLUE,
+    GREEN,
     ORANGE,
     PURPLE,
     VERMILION,
@@ -15,14 +16,18 @@ from coramp.report.style import (
     legend_below,
     new_figure,
 )
-from coramp.studies.baseline_layout import CONTROLLED, GAP, LANE, settings_of
+from coramp.studies.baseline_layout import CONTROLLED, DRIVER_GAP_S
+from coramp.studies.baseline_runs import GAP, LANE, STANDSTILL, settings_of
 from coramp.studies.statistics import estimate
 
 FLOW = ["mainline_veh_h", "ramp_veh_h"]
 POPULATIONS = {"paper": (VERMILION, "s", -0.2), "fair": (ORANGE, "D", 0.2)}
+AUTOMATED, UNYIELDING = "automated", "automated, no room"
 KINDS = {
     "ACC": ("uncoordinated, ACC", VERMILION, "s", "--"),
     "CACC": ("uncoordinated, CACC", ORANGE, "D", "-."),
+    AUTOMATED: ("automated Krauss, making room", GREEN, "v", "-"),
+    UNYIELDING: ("automated Krauss, making no room", GREEN, "v", ":"),
     CONTROLLED: ("mainline priority", BLUE, "o", "-"),
     "ramp-priority": ("ramp priority", PURPLE, "^", ":"),
 }
@@ -31,7 +36,7 @@ KINDS = {
 def baseline_figure(runs: pl.DataFrame) -> Figure:
     """Returns the mainline delay of each baseline by flow, and delay over the time gap by flow."""
     rows = [
-        {**run, "said": settings_of(run), "delay_s": _delay_s(run)}
+        {**run, "said": settings_of(run), "kind": _kind(run), "delay_s": _delay_s(run)}
         for run in runs.filter(status="ok").iter_rows(named=True)
     ]
     flows = sorted({(row[FLOW[0]], row[FLOW[1]]) for row in rows})
@@ -51,6 +56,16 @@ def baseline_figure(runs: pl.DataFrame) -> Figure:
     return figure
 
 
+def _kind(run: dict[str, Any]) -> str:
+    """What a run is in the diagrams over the time gap: one of ``KINDS``, or another strategy."""
+    said = settings_of(run)
+    if run["drivers"] is None:
+        return str(run["strategy"]) if said[STANDSTILL] == 0.0 else ""
+    if run["drivers"].startswith("automated"):
+        return AUTOMATED if said["lc_cooperative"] == 1.0 else UNYIELDING
+    return str(said["car_following"])
+
+
 def _delay_s(run: dict[str, Any]) -> float:
     mainline, ramp = run["vehicles_mainline"], run["vehicles_ramp"]
     lost_s = (run["mainline_delay_s"] or 0.0) * mainline + (run["ramp_delay_s"] or 0.0) * ramp
@@ -60,7 +75,8 @@ def _delay_s(run: dict[str, Any]) -> float:
 def _draw_baselines(
     axes: Axes, rows: list[dict[str, Any]], flows: list[tuple[float, float]]
 ) -> None:
-    own = [row for row in rows if row["drivers"] and row["said"]["car_following"] == "Krauss"]
+    own = [row for row in rows if row["kind"] == "Krauss" and row["said"]["tau_s"] == DRIVER_GAP_S]
+    own = [row for row in own if row["drivers"] in POPULATIONS]
     places = {flow: k for k, flow in enumerate(f for f in flows if _at(own, f))}
     for population, (colour, marker, aside) in POPULATIONS.items():
         for flow, place in places.items():
@@ -83,7 +99,7 @@ def _draw_baselines(
     ours = [
         row
         for row in rows
-        if row["strategy"] == CONTROLLED and row["said"][GAP] == 0.0 and _on_own_lane(row)
+        if row["kind"] == CONTROLLED and row["said"][GAP] == 0.0 and _on_own_lane(row)
     ]
     means = [estimate([row["delay_s"] for row in _at(ours, flow)]).mean for flow in places]
     axes.plot(list(places.values()), means, color=BLUE, marker="o", label="mainline priority")
@@ -103,10 +119,9 @@ def _draw_gaps(axes: Axes, rows: list[dict[str, Any]]) -> None:
     for kind, (label, colour, marker, line) in KINDS.items():
         found: dict[float, list[float]] = {}
         for row in rows:
-            if row["drivers"] and row["said"]["car_following"] == kind:
-                found.setdefault(row["said"]["tau_s"], []).append(row["delay_s"])
-            elif row["strategy"] == kind and _on_own_lane(row):
-                found.setdefault(row["said"][GAP], []).append(row["delay_s"])
+            if row["kind"] == kind and _on_own_lane(row):
+                gap_s = row["said"]["tau_s" if row["drivers"] else GAP]
+                found.setdefault(gap_s, []).append(row["delay_s"])
         gaps = sorted(found)
         estimates = [estimate(found[gap]) for gap in gaps]
         axes.errorbar(

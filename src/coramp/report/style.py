@@ -58,6 +58,11 @@ UNCONTROLLED = {
     "fair": Look("no control, fair drivers", ORANGE, "D", "-."),
     "paper-sigma0": Look("no control, paper's drivers, no noise", GREEN, "v", "--"),
     "fair-sigma0": Look("no control, fair drivers, no noise", SKY, "P", "-."),
+    "credible": Look("no control, credible drivers", BLACK, "X", "--"),
+    "credible-uniform": Look("no control, credible drivers, all alike", GREY, "X", "-."),
+    "automated-0.6": Look("no control, automated at 0.6 s", SKY, "v", ":"),
+    "automated-0.8": Look("no control, automated at 0.8 s", GREEN, "v", ":"),
+    "automated-1.0": Look("no control, automated at 1.0 s", PURPLE, "v", ":"),
 }
 COOPERATIVE = {
     "mainline-priority": Look("mainline priority", BLUE, "o", "-", 2.8),

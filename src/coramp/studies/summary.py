@@ -9,6 +9,7 @@ from coramp.running import broken_promises
 from coramp.studies.baseline_layout import baseline_tables
 from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
+from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.field_layout import field_tables
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
@@ -21,6 +22,7 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "capacity": capacity_tables,
     "field": field_tables,
     "baseline": baseline_tables,
+    "drivers": drivers_tables,
 }
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 

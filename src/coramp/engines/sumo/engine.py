@@ -25,8 +25,15 @@ from coramp.engines.outcomes import (
 from coramp.engines.sumo.cooperative import CooperativePlant
 from coramp.engines.sumo.demand import cooperative_routes, driver_routes
 from coramp.engines.sumo.metering import Meter, loops
-from coramp.engines.sumo.network import RAMP_LANES, RoadPlan, network_file, road_plan
+from coramp.engines.sumo.network import (
+    RAMP_LANES,
+    RoadPlan,
+    driver_road_plan,
+    network_file,
+    road_plan,
+)
 from coramp.engines.sumo.session import Session
+from coramp.engines.sumo.traits import traits_of
 from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records import Outcome, Pieces
@@ -118,14 +125,14 @@ def run_uncontrolled(
 ) -> Outcome:
     """Returns what happened with SUMO's own drivers on the same arrivals, metered or not."""
     arrivals = arrivals_of(scenario, seed)
-    ramp_limit_mps = scenario.ramp.speed_mps if drivers.wish == "free-flow" else None
     metered = is_metered(strategy)
-    plan = road_plan(scenario, ramp_limit_mps, metered)
+    plan = driver_road_plan(scenario, drivers, metered)
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
-        files.write_routes(driver_routes(scenario, drivers, arrivals, metered))
+        traits = traits_of(drivers, arrivals, seed)
+        files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered))
         look_steps = round(LOOK_S / step_s)
         if metered:
             look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)

@@ -13,14 +13,14 @@ import shutil
 import subprocess
 import tempfile
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import sumo
 
 from coramp.errors import CorampError
-from coramp.scenario import Scenario
+from coramp.scenario import Drivers, Scenario
 
 LANE_WIDTH_M = 3.2
 RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})
@@ -75,13 +75,8 @@ class RoadPlan:
         }
 
 
-def road_plan(
-    scenario: Scenario, ramp_limit_mps: float | None = None, metered: bool = False
-) -> RoadPlan:
-    """Returns the plan of a scenario's road, with another speed limit on the ramp if given.
-
-    ``metered`` puts a signal on the ramp.
-    """
+def road_plan(scenario: Scenario) -> RoadPlan:
+    """Returns the plan of a scenario's road."""
     mainline, ramp = scenario.mainline, scenario.ramp
     return RoadPlan(
         mainline_m=-mainline.start_m,
@@ -89,10 +84,24 @@ def road_plan(
         acceleration_lane_m=ramp.acceleration_lane_m,
         downstream_m=mainline.end_m - ramp.acceleration_lane_m,
         mainline_limit_mps=mainline.limit_mps,
-        ramp_limit_mps=ramp.limit_mps if ramp_limit_mps is None else ramp_limit_mps,
+        ramp_limit_mps=ramp.limit_mps,
         merge_angle_deg=ramp.merge_angle_deg,
-        gore_m=-scenario.signal_station_m if metered else 0.0,
     )
+
+
+def driver_road_plan(scenario: Scenario, drivers: Drivers, metered: bool = False) -> RoadPlan:
+    """Returns the plan of the road for drivers, who find their wishes on its limits.
+
+    Free flow is v_R0 on the ramp; where drivers wish more or less than the common speed by a
+    factor, that is SUMO's factor of the limit, and so v0 is the limit of the mainline. ``metered``
+    puts a signal on the ramp.
+    """
+    plan = road_plan(scenario)
+    if drivers.wish == "free-flow":
+        plan = replace(plan, ramp_limit_mps=scenario.ramp.speed_mps)
+    if drivers.speed_factor is not None:
+        plan = replace(plan, mainline_limit_mps=scenario.mainline.speed_mps)
+    return replace(plan, gore_m=-scenario.signal_station_m) if metered else plan
 
 
 @cache
