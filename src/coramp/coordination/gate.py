@@ -59,9 +59,7 @@ class Stop(NamedTuple):
     code: int
 
 
-def gate_for(
-    arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0
-) -> Gate:
+def gate_for(arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0) -> Gate:
     """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
     on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
     streams = [np.flatnonzero(~on_ramp), np.flatnonzero(on_ramp)]
@@ -112,13 +110,15 @@ def _waiting_at(
             and gate.step[gate.of_stream[stream, place + counts[stream]]] <= step
         ):
             counts[stream] += 1
-    numbers = np.empty(counts.sum(), np.int64)
+    numbers: IntArray = np.empty(counts.sum(), np.int64)
     for stream in range(2):
         place, start = gate.next_place[stream], counts[0] * stream
         numbers[start : start + counts[stream]] = gate.of_stream[
             stream, place : place + counts[stream]
         ]
-    return numbers, gate.on_ramp[numbers], gate.step[numbers] * step_s, gate.length_m[numbers]
+    since_s = np.empty(len(numbers))
+    since_s[:] = gate.step[numbers] * step_s
+    return numbers, gate.on_ramp[numbers], since_s, gate.length_m[numbers]
 
 
 @kernel

@@ -164,7 +164,7 @@ def late_start(
 ) -> int:
     """Writes a ramp vehicle's way to the nose that goes on to its stop, stands, and starts again.
 
-    It stands for ``wait_s`` from when it has come to its stop, or from ``from_s`` if it has by then.
+    It stands for ``wait_s`` from when it comes to its stop, or from ``from_s`` if that is later.
     Returns 0 for a commitment that does not end in a stand.
     """
     if pieces[len(pieces) - 1, SPEED] > 0.0:
