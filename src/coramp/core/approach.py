@@ -199,7 +199,7 @@ def late_start(
 ) -> int:
     """Writes a ramp vehicle's way to the nose that goes on to its stop, stands, and starts again.
 
-    It stands for ``wait_s`` from when it has come to its stop, or from ``from_s`` if it has by then.
+    It stands for ``wait_s`` from when it is at its stop, or from ``from_s`` if it is by then.
     Returns 0 for a commitment that does not end in a stand.
     """
     if pieces[len(pieces) - 1, SPEED] > 0.0:
