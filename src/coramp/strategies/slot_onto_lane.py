@@ -24,8 +24,9 @@ from coramp.core.trajectory import (
     station_and_speed,
     time_at_station,
 )
+from coramp.strategies.delays import delay_followers
 from coramp.strategies.ladder import plan_of
-from coramp.strategies.rungs import Merge, delay_followers, no_merge
+from coramp.strategies.rungs import Merge, no_merge
 from coramp.strategies.situation import (
     RUNG_DELAY,
     RUNG_FREE,
