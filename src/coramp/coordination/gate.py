@@ -59,9 +59,7 @@ class Stop(NamedTuple):
     code: int
 
 
-def gate_for(
-    arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0
-) -> Gate:
+def gate_for(arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0) -> Gate:
     """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
     on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
     streams = [np.flatnonzero(~on_ramp), np.flatnonzero(on_ramp)]

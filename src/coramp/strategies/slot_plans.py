@@ -122,9 +122,7 @@ def plan_in_lane(
         else:
             failed_m = middle_m
     if halvings > 0:
-        n = slow_down_to_slot(
-            fleet, proposal, row, leader, from_s, slot_m - found_m, clears, rules
-        )
+        n = slow_down_to_slot(fleet, proposal, row, leader, from_s, slot_m - found_m, clears, rules)
     return proposal.pieces[0, :n], free_m - slot_m + found_m
 
 
@@ -312,17 +310,13 @@ def earliest_slot_m(fleet: Fleet, situation: Situation, claim_s: float, rules: R
     behind the nose, but is never before its claim.
     """
     road, motion = rules.road, rules.motion
-    station_m, speed_mps = station_and_speed(
-        committed(fleet, situation.subject), situation.from_s
-    )
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
     out = np.empty((MAX_PIECES, 4))
     n = begin(out, situation.from_s, station_m, speed_mps)
     n = change_speed(out, n, road.ramp_limit_mps, motion)
     n = clip_end(out, n, time_at_station(out[:n], 0.0))
     v0 = road.mainline_speed_mps
-    fastest_m = -v0 * out[n - 1, TIME] - lag_m(
-        v0, out[n - 1, SPEED], motion.ramp_acceleration_mps2
-    )
+    fastest_m = -v0 * out[n - 1, TIME] - lag_m(v0, out[n - 1, SPEED], motion.ramp_acceleration_mps2)
     return max(situation.free_m, min(fastest_m, -v0 * claim_s))
 
 
@@ -462,9 +456,7 @@ def slow_on_ramp(
     than ``slowest_ramp_speed_mps``.
     """
     motion = rules.motion
-    station_m, speed_mps = station_and_speed(
-        committed(fleet, situation.subject), situation.from_s
-    )
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
     n = slow_phase(
         out,
         situation.from_s,
