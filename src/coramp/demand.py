@@ -10,12 +10,13 @@ from coramp.scenario import Safety
 def demand_above_limit(spec: RunSpec) -> str | None:
     """Returns in a line that a cooperative run's flows are above its lane's limit, else None.
 
-    Arrivals that are listed one by one have no flow.
+    Arrivals that are listed one by one have no flow. Of flows that change the most counts.
     """
     scenario = spec.scenario
     if spec.drivers is not None or scenario.arrivals:
         return None
-    demand_veh_h = scenario.mainline.flow_veh_h + scenario.ramp.flow_veh_h
+    streams = (scenario.mainline.flows_veh_h, scenario.ramp.flows_veh_h)
+    demand_veh_h = max(map(sum, zip(*streams, strict=True)))
     limit_veh_h = lane_limit_veh_h(lane_headway_s(scenario.vehicle.length_m, scenario.rules()))
     if demand_veh_h <= limit_veh_h:
         return None

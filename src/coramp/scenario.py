@@ -44,15 +44,14 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-class Mainline(Model):
-    """The mainline lane of the control zone; station 0 is the end of the ramp.
+class Stream(Model):
+    """Where vehicles come from, how fast and how many.
 
     With ``flow_to_veh_h`` the flow changes evenly, from ``flow_veh_h`` at the start to it at the
     horizon.
     """
 
     start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
-    end_m: Annotated[float, Field(gt=0.0, le=20000.0)]
     speed_mps: Speed
     limit_mps: Speed
     entry_speed_mps: SpeedRange
@@ -60,8 +59,20 @@ class Mainline(Model):
     flow_to_veh_h: Flow | None = None
     min_headway_s: Headway
 
+    @property
+    def flows_veh_h(self) -> tuple[float, float]:
+        """The flow at the start and at the horizon."""
+        end = self.flow_veh_h if self.flow_to_veh_h is None else self.flow_to_veh_h
+        return self.flow_veh_h, end
 
-class Ramp(Model):
+
+class Mainline(Stream):
+    """The mainline lane of the control zone; station 0 is the end of the ramp."""
+
+    end_m: Annotated[float, Field(gt=0.0, le=20000.0)]
+
+
+class Ramp(Stream):
     """The ramp, which ends at station 0, and the acceleration lane behind it.
 
     ``stop_station_m`` is where a vehicle stops that has no merge yet; left out, it is as near to
@@ -69,16 +80,8 @@ class Ramp(Model):
     mainline's loop for ramp metering; left out, it is three quarters along the lane.
     ``signal_station_m`` is that of its stop line; left out, it is 60 m before the nose, or a
     quarter of a shorter ramp, so that who was stopped can speed up before it merges.
-    ``flow_to_veh_h`` is as on the mainline.
     """
 
-    start_m: Annotated[float, Field(lt=0.0, ge=-20000.0)]
-    speed_mps: Speed
-    limit_mps: Speed
-    entry_speed_mps: SpeedRange
-    flow_veh_h: Flow
-    flow_to_veh_h: Flow | None = None
-    min_headway_s: Headway
     acceleration_lane_m: Annotated[float, Field(gt=0.0, le=5000.0)]
     merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
     decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0

@@ -88,5 +88,6 @@ def _kind(spec: RunSpec) -> tuple[str, bool]:
 
 def _vehicles(spec: RunSpec) -> float:
     scenario = spec.scenario
-    flow_veh_h = scenario.mainline.flow_veh_h + scenario.ramp.flow_veh_h
+    streams = (scenario.mainline, scenario.ramp)
+    flow_veh_h = sum(0.5 * sum(stream.flows_veh_h) for stream in streams)
     return max(float(len(scenario.arrivals)), flow_veh_h * scenario.simulation.horizon_s / 3600.0)
