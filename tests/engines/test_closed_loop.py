@@ -19,6 +19,8 @@ CASES = [
     ("expressway", "ramp-priority", 1800, 500, 4, {}),
     ("paper", "mainline-priority", 1800, 800, 6, {"safety.time_gap_s": 0.6}),
     ("paper", "fifo-optimal-control", 1800, 500, 7, DRIVERS_GAPS),
+    ("paper", "slots", 2000, 600, 10, {"safety.time_gap_s": 1.0}),
+    ("expressway", "slots", 1500, 600, 11, DRIVERS_GAPS),
     ("paper", "mainline-priority", 2400, 900, 2, {"safety.positioning_error_m": 0.5}),
     ("paper", "mainline-priority", 1800, 600, 1, {"control.gap_position": "front"}),
     ("paper", "mainline-priority", 1800, 600, 1, {"control.gap_creation_start": "nose"}),
