@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from coramp.core.approach import (
     append_stop,
     approach_without_stop,
+    brake_and_go,
     change_speed,
     harmonise,
     late_approach,
@@ -176,6 +177,49 @@ def test_late_approach_cannot_be_early_or_slower_than_the_slowest():
     latest = _written(late_approach, 0.0, -147.0, 16.0, latest_s - 1e-3, ROAD, MOTION)
     assert latest[-1] == pytest.approx(np.array([latest_s - 1e-3, 0.0, 16.0, 0.0]), abs=1e-6)
     assert len(_written(late_approach, 0.0, -147.0, 16.0, latest_s + 1e-3, ROAD, MOTION)) == 0
+
+
+def test_brake_and_go_by_hand():
+    # at 16 m/s the nose is 10 s away; 2 s later is 32 m lost: (16 - u)^2 (1/4 + 1/3) = 32
+    less_mps = math.sqrt(32.0 / (1.0 / 4.0 + 1.0 / 3.0))
+    way = _written(brake_and_go, 0.0, -160.0, 16.0, 12.0, ROAD, MOTION)
+    brake_s, regain_s = less_mps / 2.0, less_mps / 1.5
+    braked_m = -160.0 + (16.0 - 0.5 * less_mps) * brake_s
+    expected = [
+        [0.0, -160.0, 16.0, -2.0],
+        [brake_s, braked_m, 16.0 - less_mps, 1.5],
+        [brake_s + regain_s, braked_m + (16.0 - 0.5 * less_mps) * regain_s, 16.0, 0.0],
+        [12.0, 0.0, 16.0, 0.0],
+    ]
+    assert way == close(np.array(expected))
+
+
+def test_brake_and_go_may_stand_for_a_while():
+    # 20 s late are 320 m; 256 (1/4 + 1/3) = 149.33 m are lost by stopping, the rest by standing
+    way = _written(brake_and_go, 0.0, -160.0, 16.0, 30.0, ROAD, MOTION)
+    expected = [
+        [0.0, -160.0, 16.0, -2.0],
+        [8.0, -96.0, 0.0, 0.0],
+        [8.0 + 32.0 / 3.0, -96.0, 0.0, 1.5],
+        [8.0 + 64.0 / 3.0, -96.0 + 256.0 / 3.0, 16.0, 0.0],
+        [30.0, 0.0, 16.0, 0.0],
+    ]
+    assert way == close(np.array(expected))
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 4.0, 16.0, 17.0])
+@pytest.mark.parametrize("nose_s", [25.0, 40.0])
+def test_brake_and_go_is_at_the_nose_in_time_from_any_speed(speed_mps, nose_s):
+    way = _written(brake_and_go, 3.0, -200.0, speed_mps, nose_s, ROAD, MOTION)
+    assert way[0, :3].tolist() == [3.0, -200.0, speed_mps]
+    assert way[-1, :3] == close(np.array([nose_s, 0.0, 16.0]))
+
+
+def test_brake_and_go_is_neither_early_nor_short_of_the_ramp_s_speed():
+    assert len(_written(brake_and_go, 0.0, -160.0, 16.0, 9.9, ROAD, MOTION)) == 0
+    assert len(_written(brake_and_go, 0.0, -160.0, 8.0, 10.1, ROAD, MOTION)) == 0
+    assert len(_written(brake_and_go, 0.0, -80.0, 0.0, 30.0, ROAD, MOTION)) == 0  # 85.3 m
+    assert len(_written(brake_and_go, 0.0, -86.0, 0.0, 30.0, ROAD, MOTION)) > 0
 
 
 def test_late_start_by_hand():

@@ -125,8 +125,6 @@ def come_late_by(
         return no_merge()
     if too_near_ahead(fleet, proposal, situation, gap, rules):
         return no_merge()
-    if not delay_followers(fleet, proposal, situation, rules):
-        return no_merge()
     if not push_back(
         fleet,
         proposal,
@@ -138,6 +136,8 @@ def come_late_by(
         back_m,
         rules,
     ):
+        return no_merge()
+    if not delay_followers(fleet, proposal, situation, rules):
         return no_merge()
     unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
     if unsafe >= 0:
