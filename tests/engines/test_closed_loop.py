@@ -9,6 +9,7 @@ import coramp
 from coramp.engines.sumo.network import sumo_binary
 from tests.outside import JUNCTION_M, POSITION_ROUNDING_M, examine
 
+DRIVERS_GAPS = {"safety.time_gap_s": 1.0, "safety.standstill_gap_m": 2.5}
 CASES = [
     ("paper", "mainline-priority", 1500, 700, 77, {}),
     ("paper", "ramp-priority", 1300, 600, 5, {}),
@@ -17,6 +18,7 @@ CASES = [
     ("expressway", "mainline-priority", 2000, 800, 3, {}),
     ("expressway", "ramp-priority", 1800, 500, 4, {}),
     ("paper", "mainline-priority", 1800, 800, 6, {"safety.time_gap_s": 0.6}),
+    ("paper", "fifo-optimal-control", 1800, 500, 7, DRIVERS_GAPS),
     ("paper", "mainline-priority", 2400, 900, 2, {"safety.positioning_error_m": 0.5}),
     ("paper", "mainline-priority", 1800, 600, 1, {"control.gap_position": "front"}),
     ("paper", "mainline-priority", 1800, 600, 1, {"control.gap_creation_start": "nose"}),

@@ -54,6 +54,18 @@ def test_driving_the_commands_stays_on_the_plan(parts):
         assert abs(station_m - planned_m) <= bound_m
 
 
+@given(st.floats(0.5, 25.0), st.integers(1, 120), st.integers(0, 9000))
+def test_braking_to_a_stand_commands_no_speed_below_0(speed_mps, steps, from_step):
+    # the stand is at a step, where the piece before it is still evaluated
+    pieces = np.array(
+        [
+            (from_step * STEP_S, -300.0, speed_mps, -speed_mps / (steps * STEP_S)),
+            ((from_step + steps) * STEP_S, -300.0 + 0.5 * speed_mps * steps * STEP_S, 0.0, 0.0),
+        ]
+    )
+    assert (command_table(pieces, STEP_S, from_step)[:, 1] >= 0.0).all()
+
+
 @given(stretches)
 def test_knots_on_the_grid_are_driven_exactly(parts):
     whole = [(accel, max(1, round(duration / STEP_S)) * STEP_S) for accel, duration in parts]

@@ -11,7 +11,8 @@ from coramp.core.fleet import empty_proposal
 from coramp.scenario import Scenario
 from coramp.snapshots import Snapshot, load_snapshot
 from coramp.strategies.base import Decision, Memory, View
-from coramp.strategies.rungs import create, delay, merge_freely, reach
+from coramp.strategies.delays import delay
+from coramp.strategies.rungs import create, merge_freely, reach
 from coramp.strategies.situation import assess
 from tests.outside import POSITION_ROUNDING_M, examine
 

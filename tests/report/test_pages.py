@@ -12,6 +12,7 @@ from coramp.errors import CorampError
 from coramp.metrics.schemas import RESULT_VERSION
 from coramp.report.plan_figure import pieces_of_each
 from coramp.reporting import replay, report
+from coramp.run_folder import read_run
 from tests.report.browser import chromium, in_browser, opened
 
 TRAFFIC = {"mainline_veh_h": 1800.0, "ramp_veh_h": 500.0, "seed": 77, "horizon_s": 120.0}
@@ -220,3 +221,26 @@ def test_a_run_that_gives_other_delays_than_the_study_is_not_shown(folders, tmp_
     )
     assert ">ramp priority</option>" not in text
     assert ">mainline priority</option>" in text
+
+
+def test_a_report_sets_the_delay_beside_the_least_that_the_lane_allows(folders):
+    summary = read_run(folders / "mainline-priority").content["summary"]
+    text = report(folders / "mainline-priority", folders / "uncontrolled").read_text()
+    assert (
+        f"All together lose {summary['delay_s']:.2f} s, {summary['delay_bound_ratio']:.2f} times "
+        f"the {summary['delay_bound_s']:.2f} s that the lane allows at best."
+    ) in text
+    for line in ("least delay that the lane allows, of all (s)", "most that the lane carries"):
+        assert line in text
+
+
+def test_a_run_from_before_the_bound_still_has_a_report(folders, tmp_path):
+    old = shutil.copytree(folders / "mainline-priority", tmp_path / "old")
+    content = json.loads((old / "run.json").read_text())
+    kept = {k: v for k, v in content["summary"].items() if "bound" not in k and "lane" not in k}
+    kept.pop("delay_s")
+    old_content = {**content, "summary": kept, "result_version": 3}
+    (old / "run.json").write_text(json.dumps(old_content))
+    text = report(old).read_text()
+    assert "mainline delay, mean (s)" in text
+    assert "All together lose" not in text

@@ -16,7 +16,8 @@
     TOO_NEAR_AT_MERGE,
     CHANGES_THE_PAST,
     STARTS_TOO_LATE,
-) = range(15)
+    HOLDS_NEWCOMERS,
+) = range(16)
 
 REASONS = (
     "accepted",
@@ -34,6 +35,7 @@ REASONS = (
     "comes nearer than Eq. 15 or 16 at the lane change",
     "changes a lane change that has happened, or the stream",
     "starts later than the vehicle can act: what it drives until then is missing",
+    "may hold up a mainline vehicle that is yet to enter, which its strategy does not declare",
 )
 
 JOIN = 1e-6

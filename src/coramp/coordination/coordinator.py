@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.audit.reasons import ACCEPTED, REASONS
+from coramp.audit.reasons import ACCEPTED, HOLDS_NEWCOMERS, REASONS
 from coramp.coordination.admission import (
     decision_due_s,
     plan_moving_up,
@@ -31,6 +31,7 @@ from coramp.coordination.gate import (
     waiting_at,
 )
 from coramp.coordination.ledger import Ledger
+from coramp.coordination.newcomers import in_the_way
 from coramp.coordination.plant import Arrival, Plant
 from coramp.coordination.supervisor import drive_safely
 from coramp.core.approach import stop_starts_s
@@ -102,7 +103,7 @@ class Coordinator:
         self._examiner = Examiner(bounds_of(rules))
         self._arrivals = arrivals
         policy = entry_policy_of(strategy)
-        self._asks_at_entry = policy.asked
+        self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
         slowest_mps = policy.slowest_share * road.mainline_speed_mps
         self._gate = gate_for(arrivals, policy.asked, slowest_mps)
         self._fastest_entry_mps = fastest_entry_mps
@@ -327,9 +328,18 @@ class Coordinator:
         if trajectories:
             earliest_s = time_s + self._rules.control.actuation_delay_s
             verdict = self._examiner.change(self.ledger, trajectories, earliest_s)
-            if verdict.code != ACCEPTED:
+            code = verdict.code
+            if (
+                code == ACCEPTED
+                and not self._holds_newcomers
+                and in_the_way(
+                    self.ledger, trajectories, time_s, self._fastest_entry_mps, self._rules
+                )
+            ):
+                code = HOLDS_NEWCOMERS
+            if code != ACCEPTED:
                 self.interventions += 1
-                self._refuse(subjects, step, verdict.code)
+                self._refuse(subjects, step, code)
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:

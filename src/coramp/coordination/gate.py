@@ -110,13 +110,15 @@ def _waiting_at(
             and gate.step[gate.of_stream[stream, place + counts[stream]]] <= step
         ):
             counts[stream] += 1
-    numbers = np.empty(counts.sum(), np.int64)
+    numbers: IntArray = np.empty(counts.sum(), np.int64)
     for stream in range(2):
         place, start = gate.next_place[stream], counts[0] * stream
         numbers[start : start + counts[stream]] = gate.of_stream[
             stream, place : place + counts[stream]
         ]
-    return numbers, gate.on_ramp[numbers], gate.step[numbers] * step_s, gate.length_m[numbers]
+    since_s = np.empty(len(numbers))
+    since_s[:] = gate.step[numbers] * step_s
+    return numbers, gate.on_ramp[numbers], since_s, gate.length_m[numbers]
 
 
 @kernel

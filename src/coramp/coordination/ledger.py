@@ -92,6 +92,10 @@ class Ledger:
         """Returns the committed merge time (s): infinity for none, -infinity on the mainline."""
         return float(self.book.merge_time_s[row])
 
+    def length_m(self, row: int) -> float:
+        """Returns the length (m) of a vehicle."""
+        return float(self.book.length_m[row])
+
     def trajectory(self, row: int) -> FloatArray:
         """Returns what ``row`` has committed to, shape (n, 4); empty before it enters."""
         first = self.book.first_piece[row]

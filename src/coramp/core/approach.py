@@ -154,6 +154,41 @@ def late_approach(
 
 
 @kernel
+def brake_and_go(
+    time_s: float,
+    station_m: float,
+    speed_mps: float,
+    nose_s: float,
+    road: Road,
+    motion: MotionLimits,
+    out: FloatArray,
+) -> int:
+    """Writes a ramp vehicle's way to pass the nose at ``nose_s`` that loses its time at once.
+
+    It brakes, to a stand and a wait if need be, and goes up to the ramp's speed r again. Against
+    one at r it loses ``(r-u)^2 (1/(2d) + 1/(2a)) - (r-v)^2 / (2d)`` metres if it brakes by d from v
+    to u and speeds up by a, and r metres a second while it stands. Returns 0 where the way is too
+    short for that, or ``nose_s`` too early.
+    """
+    ramp_mps = road.ramp_speed_mps
+    per_slowing, per_regaining = 0.5 / motion.slow_down_mps2, 0.5 / motion.speed_up_mps2
+    lost_m = ramp_mps * (nose_s - time_s) + station_m
+    square = (lost_m + (ramp_mps - speed_mps) ** 2 * per_slowing) / (per_slowing + per_regaining)
+    if square < 0.0 or ramp_mps - math.sqrt(square) > speed_mps:
+        return 0
+    low_mps, wait_s = ramp_mps - math.sqrt(square), 0.0
+    if low_mps < 0.0:
+        standing_m = ramp_mps * ramp_mps * (per_slowing + per_regaining)
+        standing_m -= (ramp_mps - speed_mps) ** 2 * per_slowing
+        low_mps, wait_s = 0.0, (lost_m - standing_m) / ramp_mps
+    brake_s = (speed_mps - low_mps) / motion.slow_down_mps2 + wait_s
+    n = harmonise(out, time_s, station_m, speed_mps, 0.0, brake_s, ramp_mps, motion)
+    if out[n - 1, STATION] > 0.0:
+        return 0
+    return clip_end(out, n, time_at_station(out[:n], 0.0))
+
+
+@kernel
 def late_start(
     pieces: FloatArray,
     from_s: float,
@@ -164,7 +199,7 @@ def late_start(
 ) -> int:
     """Writes a ramp vehicle's way to the nose that goes on to its stop, stands, and starts again.
 
-    It stands for ``wait_s`` from when it has come to its stop, or from ``from_s`` if it has by then.
+    It stands for ``wait_s`` from when it is at its stop, or from ``from_s`` if it is by then.
     Returns 0 for a commitment that does not end in a stand.
     """
     if pieces[len(pieces) - 1, SPEED] > 0.0:

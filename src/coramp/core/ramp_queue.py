@@ -8,6 +8,7 @@ import math
 from coramp._kernel import FloatArray, kernel
 from coramp.core.approach import append_stop, approach_without_stop, harmonise
 from coramp.core.fleet import (
+    MAX_CHANGED,
     ROUNDING_M,
     Fleet,
     Proposal,

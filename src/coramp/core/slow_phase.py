@@ -14,7 +14,21 @@ The larger root is the one whose cruise lasts 0 s or longer.
 import math
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.trajectory import begin, drive, drive_to_speed
+from coramp.core.rules import MotionLimits
+from coramp.core.trajectory import (
+    MAX_PIECES,
+    SPEED,
+    STATION,
+    TIME,
+    begin,
+    drive,
+    drive_to_speed,
+)
+
+MOST_PERIODS = MAX_PIECES - 8
+"""Pieces of a way of least effort; some are left for what comes after it."""
+SHORTEST_HOLD_S = 0.5
+SAME_MPS = 1e-9
 
 
 @kernel
@@ -76,3 +90,51 @@ def slow_phase(
     n = drive_to_speed(out, n, rate_mps2, slow_mps)
     n = drive(out, n, 0.0, kept_s)
     return drive_to_speed(out, n, speed_up_mps2, v0_mps)
+
+
+@kernel
+def least_effort_way(
+    out: FloatArray,
+    time_s: float,
+    station_m: float,
+    speed_mps: float,
+    end_s: float,
+    intercept_m: float,
+    v0_mps: float,
+    jerk_mps3: float,
+    motion: MotionLimits,
+) -> int:
+    """Writes the way of least effort that is at v0 by ``end_s`` on ``intercept_m``.
+
+    Over T seconds from speed u, with ``e`` the way that the mean of both speeds leaves,
+
+        accel(t) = (v0 - u) / T + 6 e / T^2 (1 - 2 t / T),
+
+    which minimises the integral of its square (``core.least_effort``); it is held over equal
+    periods, whose line is steeper by 1 / (1 - 1 / n^2). Returns its length, 0 where it would
+    accelerate or brake harder than ``motion`` allows, change its acceleration by more than
+    ``jerk_mps3`` within 1 s, be above v0, or stand.
+    """
+    duration_s = end_s - time_s
+    periods = min(MOST_PERIODS, int(duration_s / SHORTEST_HOLD_S))
+    if periods < 2:
+        return 0
+    hold_s = duration_s / periods
+    way_m = intercept_m + v0_mps * end_s - station_m
+    excess_m = way_m - 0.5 * (speed_mps + v0_mps) * duration_s
+    mean_mps2 = (v0_mps - speed_mps) / duration_s
+    steepness = 6.0 * excess_m / (duration_s * duration_s) / (1.0 - 1.0 / (periods * periods))
+    changes_mps2 = 2.0 * abs(steepness) * min(1.0, 1.0 / duration_s)
+    first = mean_mps2 + steepness * (1.0 - 1.0 / periods)
+    last = mean_mps2 - steepness * (1.0 - 1.0 / periods)
+    if max(abs(first), abs(last), changes_mps2) > jerk_mps3:
+        return 0
+    if min(first, last) < -motion.slow_down_mps2 or max(first, last) > motion.speed_up_mps2:
+        return 0
+    n = begin(out, time_s, station_m, speed_mps)
+    for k in range(periods):
+        n = drive(out, n, mean_mps2 + steepness * (1.0 - (2.0 * k + 1.0) / periods), hold_s)
+        if not 0.0 < out[n - 1, SPEED] <= max(v0_mps, speed_mps) + SAME_MPS:
+            return 0
+    out[n - 1, STATION], out[n - 1, SPEED] = intercept_m + v0_mps * out[n - 1, TIME], v0_mps
+    return n

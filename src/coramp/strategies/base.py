@@ -5,7 +5,6 @@ to be woken and, if it has a ``period_s``, once in each such period, then withou
 answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
-import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -67,9 +66,13 @@ class Waiting:
     since_s: FloatArray
     length_m: FloatArray
 
-    def first_since_s(self, on_ramp: bool) -> float:
-        """Returns since when (s) the first vehicle of a stream waits, infinity if none does."""
-        return float(self.since_s[self.on_ramp == on_ramp].min(initial=math.inf))
+    def first(self, on_ramp: bool) -> int:
+        """Returns the place of the vehicle of a stream that waits longest, -1 if none does."""
+        if len(self.on_ramp) == 0:
+            return -1
+        if not on_ramp:
+            return -1 if self.on_ramp[0] else 0
+        return int(np.argmax(self.on_ramp)) if self.on_ramp[-1] else -1
 
 
 NOBODY_WAITS = Waiting(np.empty(0, np.int64), np.empty(0, np.bool_), np.empty(0), np.empty(0))
@@ -84,7 +87,8 @@ class View:
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
     which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
     ``reports``; ``ask_entered`` who has entered since the strategy was last asked, for ``entered``;
-    ``ask_waiting`` who waits outside, for ``waiting``. ``packed_rules`` are the rules as kernels take them (``core.rules``).
+    ``ask_waiting`` who waits outside, for ``waiting``. ``packed_rules`` are the rules as kernels
+    take them (``core.rules``).
     ``detectors`` is None where the road has none. A strategy must not write into any of the arrays.
     """
 

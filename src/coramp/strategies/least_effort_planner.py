@@ -16,8 +16,9 @@ from coramp.core.proposals import find_unsafe_pair
 from coramp.core.rules import Rules
 from coramp.core.safe_distance import following_clearance_m
 from coramp.core.trajectory import MAX_PIECES, build, station_and_speed, superpose
+from coramp.strategies.delays import delay_followers
 from coramp.strategies.ladder import plan_of
-from coramp.strategies.rungs import Merge, delay_followers, unknown_bound_m
+from coramp.strategies.rungs import Merge, unknown_bound_m
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,

@@ -11,8 +11,9 @@ from coramp._kernel import FloatArray, kernel
 from coramp.core.fleet import Fleet, Proposal, empty_proposal
 from coramp.core.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
-from coramp.strategies.rungs import create, delay, delay_and_create, merge_freely, no_merge, reach
+from coramp.strategies.rungs import create, merge_freely, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,
@@ -56,18 +57,11 @@ def first_that_helps(
                 return plan_of(
                     fleet, proposal, situation, merge, RUNG_CREATE, scenario, conflict, rules
                 ), proposal
-    for gap in range(len(situation.order) + 1):
-        merge = delay(fleet, proposal, situation, gap, rules)
-        if merge.gap >= 0:
-            return plan_of(
-                fleet, proposal, situation, merge, RUNG_DELAY, 0, conflict, rules
-            ), proposal
-    for gap in range(len(situation.order) + 1):
-        merge = delay_and_create(fleet, proposal, situation, gap, rules)
-        if merge.gap >= 0:
-            return plan_of(
-                fleet, proposal, situation, merge, RUNG_DELAY, 2, conflict, rules
-            ), proposal
+    merge, scenario = come_later(fleet, proposal, situation, rules)
+    if merge.gap >= 0:
+        return plan_of(
+            fleet, proposal, situation, merge, RUNG_DELAY, scenario, conflict, rules
+        ), proposal
     proposal.size[0] = 0
     return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal
 

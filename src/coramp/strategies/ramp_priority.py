@@ -13,11 +13,10 @@ from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal, propos
 from coramp.core.rules import Rules, unpacked
 from coramp.core.trajectory import cruise_intercept_m
 from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.rungs import (
     Merge,
-    delay,
-    delay_and_create,
     merge_at,
     merge_freely,
     no_merge,
@@ -117,18 +116,11 @@ def first_that_helps(
         return plan_of(
             fleet, proposal, situation, merge, RUNG_CREATE, scenario, conflict, rules
         ), proposal
-    for gap in range(len(situation.order) + 1):
-        merge = delay(fleet, proposal, situation, gap, rules)
-        if merge.gap >= 0:
-            return plan_of(
-                fleet, proposal, situation, merge, RUNG_DELAY, 0, conflict, rules
-            ), proposal
-    for gap in range(len(situation.order) + 1):
-        merge = delay_and_create(fleet, proposal, situation, gap, rules)
-        if merge.gap >= 0:
-            return plan_of(
-                fleet, proposal, situation, merge, RUNG_DELAY, 2, conflict, rules
-            ), proposal
+    merge, scenario = come_later(fleet, proposal, situation, rules)
+    if merge.gap >= 0:
+        return plan_of(
+            fleet, proposal, situation, merge, RUNG_DELAY, scenario, conflict, rules
+        ), proposal
     proposal.size[0] = 0
     return plan_of(fleet, proposal, situation, no_merge(), RUNG_HOLD, 0, conflict, rules), proposal
 

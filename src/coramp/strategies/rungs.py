@@ -1,4 +1,6 @@
-"""The rungs of the ladder: free, reach, create, delay; each fills a proposal or says that it can't.
+"""The rungs free, reach and create of the ladder; each fills a proposal or says that it cannot.
+
+Rung delay is in ``delays``.
 
 The functions return the chosen acceleration, merge time and merge station, and the gap's number,
 in a ``Merge``; ``gap`` is -1 where the rung does not help.
@@ -7,18 +9,11 @@ in a ``Merge``; ``gap`` is -1 where the rung does not help.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from coramp._kernel import FloatArray, kernel
-from coramp.core.approach import late_approach, late_start, stop_of_m
+from coramp._kernel import kernel
 from coramp.core.fleet import (
     ROUNDING_M,
     Fleet,
     Proposal,
-    committed,
-    entry_of,
-    pair_margin_m,
-    proposed,
 )
 from coramp.core.proposals import (
     find_unsafe_pair,
@@ -26,15 +21,12 @@ from coramp.core.proposals import (
     push_ahead,
     push_back,
 )
-from coramp.core.ramp_acceleration import acceleration_for_lag_mps2, lag_m
-from coramp.core.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
+from coramp.core.ramp_acceleration import acceleration_for_lag_mps2
 from coramp.core.rules import Rules
-from coramp.core.trajectory import MAX_PIECES, station_and_speed
 from coramp.strategies.situation import (
     Situation,
     gap_bounds_m,
     gap_of_free_movement,
-    situation_from,
 )
 
 
@@ -195,148 +187,3 @@ def create(
 def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
     """Returns the lowest intercept (m) that bothers no vehicle which is yet to enter."""
     return situation.known_m + float(fleet.length_m[situation.subject]) + situation.clearance_m
-
-
-@kernel
-def delay(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
-    """Rung delay: come late to a later gap that is large enough, as ``come_late`` does."""
-    return come_late(fleet, proposal, situation, gap, 0.0, rules)
-
-
-@kernel
-def delay_and_create(
-    fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules
-) -> Merge:
-    """Rung delay with gap creation: come late to a gap whose rear vehicle falls back (scenario 2).
-
-    By no more than what the time gaps before and behind the subject ask for; the safe distances of
-    the paper alone leave gaps enough.
-    """
-    room_m = 2.0 * rules.safety.time_gap_s * rules.road.mainline_speed_mps
-    if room_m <= 0.0:
-        return no_merge()
-    return come_late(fleet, proposal, situation, gap, room_m, rules)
-
-
-@kernel
-def come_late(
-    fleet: Fleet,
-    proposal: Proposal,
-    situation: Situation,
-    gap: int,
-    room_m: float,
-    rules: Rules,
-) -> Merge:
-    """Slow down on the ramp at once, or start late, so as to end at the front of a later gap.
-
-    The subject passes the nose late, as ``late_way`` does, and accelerates as in free movement.
-    Vehicles behind it on the ramp brake where they would come too near. The vehicle behind a gap
-    that is too small falls back by what is missing, up to ``room_m``, with its cascade.
-    """
-    low_m, high_m = gap_bounds_m(fleet, situation, gap)
-    target_m = min(high_m, situation.free_m)
-    back_m = max(0.0, low_m - target_m)
-    if back_m > room_m:
-        return no_merge()
-    if back_m > 0.0 and (
-        gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
-    ):
-        return no_merge()
-    buffer = np.empty((MAX_PIECES, 4))
-    n = late_way(fleet, situation, target_m, rules, buffer)
-    if n == 0:
-        return no_merge()
-    later = with_approach(situation, buffer[:n], rules)
-    accel_mps2 = later.free_accel_mps2
-    merge_s, merge_m = propose_merge(proposal, later.subject, later.approach, accel_mps2, rules)
-    if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
-        return no_merge()
-    if not delay_followers(fleet, proposal, situation, rules):
-        return no_merge()
-    if not push_back(
-        fleet,
-        proposal,
-        situation.order,
-        gap,
-        situation.from_s,
-        situation.from_s,
-        merge_s,
-        back_m,
-        rules,
-    ):
-        return no_merge()
-    unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
-    if unsafe >= 0:
-        return no_merge()
-    return Merge(gap, accel_mps2, merge_s, merge_m, back_m)
-
-
-@kernel
-def late_way(
-    fleet: Fleet, situation: Situation, target_m: float, rules: Rules, out: FloatArray
-) -> int:
-    """Writes the subject's way to the nose with which free movement ends at ``target_m``.
-
-    It slows down at once and passes the nose at the ramp's speed. Where that cannot be, as for a
-    vehicle of a queue, it goes on to its stop, stands, and starts in time; for no longer than a
-    vehicle in a queue may have to stand. Returns the number of pieces, 0 where there is no such
-    way.
-    """
-    road, motion, from_s = rules.road, rules.motion, situation.from_s
-    v0 = road.mainline_speed_mps
-    before = committed(fleet, situation.subject)
-    station_m, speed_mps = station_and_speed(before, from_s)
-    lag = lag_m(v0, road.ramp_speed_mps, motion.free_acceleration_mps2)
-    nose_s = -(target_m + lag) / v0
-    n = late_approach(from_s, station_m, speed_mps, nose_s, road, motion, out)
-    longest_s = longest_wait_s(rules.safety)
-    if n > 0 or longest_s <= 0.0:
-        return n
-    n = late_start(before, from_s, 0.0, road, motion, out)
-    if n == 0:
-        return 0
-    wait_s = (with_approach(situation, out[:n], rules).free_m - target_m) / v0
-    if not 0.0 < wait_s <= longest_s:
-        return 0
-    return late_start(before, from_s, wait_s, road, motion, out)
-
-
-@kernel
-def with_approach(situation: Situation, approach: FloatArray, rules: Rules) -> Situation:
-    """Returns the situation of the same subject if it comes to the nose by ``approach``."""
-    return situation_from(
-        situation.subject,
-        situation.from_s,
-        approach,
-        situation.known_m,
-        situation.order,
-        situation.intercepts_m,
-        rules,
-    )
-
-
-@kernel
-def delay_followers(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> bool:
-    """Adds those behind the subject on the ramp that would come too near to who is before them."""
-    leader = situation.subject
-    while True:
-        follower = next_behind_on_ramp(fleet, leader, situation.from_s)
-        if follower < 0:
-            return True
-        entry = entry_of(proposal, leader)
-        margin_m = pair_margin_m(
-            proposed(proposal, entry),
-            fleet.length_m[leader],
-            proposal.merge_time_s[entry],
-            committed(fleet, follower),
-            fleet.length_m[follower],
-            math.inf,
-            situation.from_s,
-            rules,
-        )
-        if margin_m >= rules.safety.execution_allowance_m - ROUNDING_M:
-            return True
-        stop_m = stop_of_m(committed(fleet, follower))
-        if not propose_stop(fleet, proposal, follower, stop_m, situation.from_s, rules):
-            return False
-        leader = follower

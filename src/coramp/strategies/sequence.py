@@ -17,10 +17,11 @@ from coramp.core.rules import Rules, unpacked
 from coramp.core.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.core.trajectory import station_and_speed
 from coramp.strategies.base import Decision, Memory, View
+from coramp.strategies.delays import come_late
 from coramp.strategies.feedback import place_on_mainline
 from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.least_effort_planner import LeastEffort
-from coramp.strategies.rungs import come_late, create, no_merge, reach
+from coramp.strategies.rungs import create, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,

@@ -6,26 +6,36 @@ these times, and is never planned again.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from coramp.core.fleet import Fleet
-from coramp.core.rules import Rules
-from coramp.strategies.base import (
-    Decision,
-    EntryPolicy,
-    FollowTrajectory,
-    Memory,
-    View,
-)
+from coramp._kernel import FloatArray
+from coramp.strategies.base import Decision, EntryPolicy, FollowTrajectory, Memory, View
 from coramp.strategies.ladder import explanation, held
 from coramp.strategies.parameters import choice, parameter
-from coramp.strategies.situation import RUNG_HOLD, assess, foremost_unknown_m
-from coramp.strategies.slot_plans import plan_in_lane, plan_onto_lane
+from coramp.strategies.situation import RUNG_HOLD
+from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, plan_in_lane
+from coramp.strategies.slot_onto_lane import crossings_s, plan_onto_lane
 
-Claims = tuple[tuple[int, float, bool], ...]
-"""Ramp vehicles without a slot: row, the crossing time (s) that they claim, whether they wait."""
-SLOWEST_SHARE = 0.6
+ON_TIME_S = 1e-6
+SLOWEST_ENTRY_SHARE = SLOWEST_SHARE + 0.1
+"""Of v0: below it a mainline vehicle waits outside. What is lost inside is lost at higher speeds,
+and the entrance carries less the slower it is passed."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A ramp vehicle that has no slot yet.
+
+    ``crossing_s`` is when it would cross if nothing had held it up. ``late_known``: mainline
+    vehicles that cross after that had entered before it. ``waits``: it was asked about in vain.
+    """
+
+    row: int
+    crossing_s: float
+    length_m: float
+    late_known: bool
+    waits: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,106 +45,156 @@ class Slots:
     name: ClassVar[str] = "slots"
     summary: ClassVar[str] = "every vehicle of both streams gets one slot of the merged lane, once"
     cooperative: ClassVar[bool] = True
-    entry_policy: ClassVar[EntryPolicy] = EntryPolicy(True, True, SLOWEST_SHARE)
+    entry_policy: ClassVar[EntryPolicy] = EntryPolicy(
+        asked=True, holds_newcomers=True, slowest_share=SLOWEST_ENTRY_SHARE
+    )
 
     order: str = choice(
         "first-come", "mainline-first", "ramp-first", "least-delay", meaning="who gets a slot first"
     )
-    ramp_share: float = parameter(0.5, 0.0, 1.0, meaning="the ramp's claim beyond the lane's limit")
+    ramp_share: float = parameter(
+        0.5, 0.0, 1.0, meaning="the ramp's claim beyond the limit: 0 mainline first, 1 ramp first"
+    )
     longest_wait_s: float = parameter(
         300.0, 1.0, 3600.0, meaning="after so long a wait, first come, first served"
     )
-
     clear_entrance: bool = parameter(
         True, meaning="mainline vehicles speed up as hard as is comfortable as they enter"
     )
+    smooth: bool = parameter(False, meaning="lags are driven with the least effort, where possible")
+    jerk_mps3: float = parameter(0.5, 0.05, 10.0, meaning="largest jerk of a smooth way, over 1 s")
+
+    def problems(self) -> list[str]:
+        """Returns what does not fit together, a line each."""
+        if self.order in ("mainline-first", "ramp-first") and self.ramp_share != 0.5:
+            problem = f"ramp_share: {self.ramp_share:g} says nothing where order is {self.order}"
+            return [f"{problem}; allowed is 0.5, or another order"]
+        return []
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the slot of the first subject, or when it is to be asked again."""
-        claims: Claims = memory if isinstance(memory, tuple) else ()
+        claims: tuple[Claim, ...] = memory if isinstance(memory, tuple) else ()
         row = first_to_plan(view)
         rest = tuple((view.time_s, other) for other in view.subjects if other != row)
         merge_s = float(view.fleet.merge_time_s[row])
         if merge_s == -math.inf:
-            return self._in_lane(view, row, rest, claims)
-        if merge_s < math.inf:
-            return Decision((), rest, claims)
-        return self._onto_lane(view, row, rest, claims)
+            decision = self._in_lane(view, row, claims)
+        elif merge_s == math.inf:
+            decision = self._onto_lane(view, row, claims)
+        else:
+            decision = Decision((), (), claims)
+        return replace(decision, wakes_s=(*rest, *decision.wakes_s))
 
-    def _in_lane(
-        self, view: View, row: int, rest: tuple[tuple[float, int], ...], claims: Claims
-    ) -> Decision:
-        pieces, _ = plan_in_lane(
-            view.fleet, row, view.time_s, self.clear_entrance, view.packed_rules
-        )
+    def _in_lane(self, view: View, row: int, claims: tuple[Claim, ...]) -> Decision:
+        """The slot of a mainline vehicle; then the first ramp vehicle that waits is asked about."""
+        manner = Manner(self.clear_entrance, self._most_jerk)
+        pieces = plan_in_lane(view.fleet, row, view.time_s, manner, view.packed_rules)
         commands = (FollowTrajectory(row, pieces, -math.inf),) if len(pieces) else ()
-        head = tuple((view.time_s, other) for other, _, waits in claims[:1] if waits)
-        return Decision(commands, (*rest, *head), claims)
+        head = tuple((view.time_s, claim.row) for claim in claims[:1] if claim.waits)
+        return Decision(commands, head, claims)
 
-    def _onto_lane(
-        self, view: View, row: int, rest: tuple[tuple[float, int], ...], claims: Claims
-    ) -> Decision:
-        if row not in [other for other, _, _ in claims]:
-            claim_s = claim_of(view, row)
-            claims = (*claims, (row, claim_s, False))
-        claim_s = next(s for other, s, _ in claims if other == row)
-        ahead_s = time_ahead_s(view)
-        if self.order == "first-come" and claim_s > view.time_s + ahead_s + 1e-6:
-            return Decision((), (*rest, (claim_s - ahead_s, row)), claims)
-        waits = tuple((other, s, w or other == row) for other, s, w in claims)
-        if not self._goes_now(view, claim_s, ahead_s):
-            return Decision((), (*rest, (view.time_s + view.rules.control.retry_s, row)), waits)
+    def _onto_lane(self, view: View, row: int, claims: tuple[Claim, ...]) -> Decision:
+        """The slot of a ramp vehicle, once it is its turn."""
+        claim = next((known for known in claims if known.row == row), None)
+        if claim is None:
+            claim = claim_of(view, row)
+            claims = (*claims, claim)
+        due_s = self._due_s(view, claim)
+        if due_s > view.time_s + ON_TIME_S:
+            wakes = ((due_s, row),) if due_s < math.inf else ()
+            return Decision((), wakes, claims)
+        waiting = tuple(replace(c, waits=True) if c.row == row else c for c in claims)
+        again = ((view.time_s + view.rules.control.retry_s, row),)
+        if not self._goes_now(view, claim):
+            return Decision((), again, waiting)
         plan, proposal, blocked, behind = plan_onto_lane(
-            view.fleet, row, view.time_s, claim_s, view.packed_rules
+            view.fleet,
+            row,
+            view.time_s,
+            claim.crossing_s,
+            claim.late_known and self.order != "mainline-first",
+            self._most_jerk,
+            view.packed_rules,
         )
         if blocked or plan.rung == RUNG_HOLD:
-            again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
-            told = any(other == row and w for other, _, w in claims)
-            return Decision((), (*rest, *again), waits, () if told else (held(row, plan),))
+            story = () if claim.waits else (held(row, plan),)
+            return Decision((), () if blocked else again, waiting, story)
         commands = tuple(
             FollowTrajectory(
                 int(proposal.rows[k]),
                 proposal.pieces[k, : proposal.piece_count[k]].copy(),
                 float(proposal.merge_time_s[k]),
+                makes_gap=bool(view.fleet.merge_time_s[proposal.rows[k]] < math.inf),
             )
             for k in range(int(proposal.size[0]))
         )
-        left = tuple(claim for claim in claims if claim[0] != row)
-        follow_up = tuple((view.time_s, other) for other, _, w in left if other == behind and w)
-        return Decision(commands, (*rest, *follow_up), left, (explanation(row, plan),))
+        left = tuple(known for known in claims if known.row != row)
+        follow_up = tuple((view.time_s, c.row) for c in left if c.row == behind and c.waits)
+        return Decision(commands, follow_up, left, (explanation(row, plan),))
 
-    def _goes_now(self, view: View, claim_s: float, ahead_s: float) -> bool:
-        """Whether a ramp vehicle gets its slot before the mainline vehicle that waits longest."""
-        since_s = view.waiting.first_since_s(False)
-        if since_s == math.inf:
+    @property
+    def _most_jerk(self) -> float:
+        """The largest jerk (m/s3) of a smooth way, 0 where ways need not be smooth."""
+        return self.jerk_mps3 if self.smooth else 0.0
+
+    def _due_s(self, view: View, claim: Claim) -> float:
+        """When (s) a ramp vehicle is asked about.
+
+        First come: before any mainline vehicle has entered that could cross after it. Mainline
+        first: where it would be planned or begin its stop, of which the loop tells; until then,
+        infinity. Ramp first: at once.
+        """
+        if self.order == "ramp-first" or claim.waits:
+            return view.time_s
+        if self.order == "mainline-first":
+            entered_now = any(entered.row == claim.row for entered in view.entered)
+            return math.inf if entered_now else view.time_s
+        return claim.crossing_s - time_ahead_s(view)
+
+    def _goes_now(self, view: View, claim: Claim) -> bool:
+        """Whether a ramp vehicle gets its slot before the mainline vehicle that waits outside."""
+        waiting = view.waiting
+        outside = waiting.first(on_ramp=False)
+        if outside < 0:
             return True
-        waited_s, late_s = view.time_s - since_s, view.time_s + ahead_s - claim_s
-        share = self.ramp_share
+        waited_s = view.time_s - float(waiting.since_s[outside])
+        late_s = view.time_s + time_ahead_s(view) - claim.crossing_s
+        length_m = float(waiting.length_m[outside])
         if max(waited_s, late_s) > self.longest_wait_s:
-            share = 0.5
-        if view.waiting.first_since_s(True) < math.inf:
+            return late_s >= waited_s
+        both_late = min(waited_s, late_s) > 0.0
+        if self.order == "least-delay" and both_late and length_m != claim.length_m:
+            return claim.length_m < length_m
+        share = {"mainline-first": 0.0, "ramp-first": 1.0}.get(self.order, self.ramp_share)
+        if waiting.first(on_ramp=True) >= 0:
             share = max(share, 0.5)
         return share * late_s >= (1.0 - share) * waited_s
 
 
 def first_to_plan(view: View) -> int:
     """Returns the subject that is planned first: who has just entered the mainline is ahead."""
-    merge_time_s = view.fleet.merge_time_s
+    merge_time_s: FloatArray = view.fleet.merge_time_s
     return min(view.subjects, key=lambda row: float(merge_time_s[row]))
 
 
 def time_ahead_s(view: View) -> float:
     """Returns how long (s) before its crossing a mainline vehicle enters at the latest."""
-    foremost_m = foremost_unknown_m(view.time_s, view.fastest_entry_mps, view.rules)
-    return -foremost_m / view.rules.road.mainline_speed_mps - view.time_s
+    v0, rules = view.rules.road.mainline_speed_mps, view.rules
+    excess_mps = max(0.0, view.fastest_entry_mps - v0)
+    delay_s = rules.control.actuation_delay_s + 0.5 * excess_mps / rules.motion.slow_down_mps2
+    return -(rules.road.mainline_start_m + excess_mps * delay_s) / v0
 
 
-def claim_of(view: View, row: int) -> float:
-    """Returns the crossing time (s) of a ramp vehicle that had not been held up outside."""
-    late_s = sum(e.time_s - e.since_s for e in view.entered if e.row == row)
-    return free_crossing_s(view.fleet, row, view.time_s, view.rules) - late_s
+def claim_of(view: View, row: int) -> Claim:
+    """Returns the claim of a ramp vehicle that has just entered.
 
-
-def free_crossing_s(fleet: Fleet, row: int, now_s: float, rules: Rules) -> float:
-    """Returns when (s) a ramp vehicle in free movement crosses the nose as if it were at v0."""
-    return -float(assess(fleet, row, now_s, 0.0, rules).free_m) / rules.road.mainline_speed_mps
+    Its crossing is that of free movement, less the time for which it was held up outside.
+    """
+    held_up_s = sum(e.time_s - e.since_s for e in view.entered if e.row == row)
+    crossing_s = crossings_s(view.fleet, row, view.time_s, view.packed_rules) - held_up_s
+    return Claim(
+        row,
+        crossing_s,
+        float(view.fleet.length_m[row]),
+        crossing_s < view.time_s + time_ahead_s(view) - 0.5 * view.rules.control.step_s,
+    )

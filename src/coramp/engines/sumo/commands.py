@@ -14,6 +14,8 @@ import numpy as np
 from coramp._kernel import FloatArray, kernel
 from coramp.core.trajectory import ACCEL, SPEED, piece_at, piece_end_s, station_and_speed
 
+ROUNDING_MPS = 1e-9
+"""By so much rounding may leave a speed below 0 where a plan comes to a stand."""
 ON_GRID = 1e-6
 """Share of a step within which a knot counts as lying on it."""
 
@@ -41,7 +43,8 @@ def command_table(pieces: FloatArray, step_s: float, from_step: int) -> FloatArr
             return out[: n + 1]
         whole = math.floor(piece_end_s(pieces, k) / step_s + ON_GRID) - step
         steps = max(1, whole)
-        _, out[n, 1] = station_and_speed(pieces, now_s + steps * step_s)
+        _, speed_mps = station_and_speed(pieces, now_s + steps * step_s)
+        out[n, 1] = 0.0 if -ROUNDING_MPS < speed_mps < 0.0 else speed_mps
         out[n, 2] = 0 if whole >= 1 and pieces[k, ACCEL] == 0.0 else steps
         n += 1
         step += steps

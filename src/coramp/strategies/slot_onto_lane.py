@@ -1,0 +1,430 @@
+"""Slots of ramp vehicles: a slower cruise on the ramp, or a later departure from their stop."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import FloatArray, kernel
+from coramp.core.approach import change_speed
+from coramp.core.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
+from coramp.core.gaps import least_acceleration_mps2
+from coramp.core.proposals import find_unsafe_pair, propose_merge
+from coramp.core.ramp_acceleration import lag_m
+from coramp.core.rules import Rules, unpacked
+from coramp.core.slow_phase import least_effort_way, slow_phase
+from coramp.core.trajectory import (
+    MAX_PIECES,
+    SPEED,
+    STATION,
+    TIME,
+    begin,
+    clip_end,
+    clip_start,
+    station_and_speed,
+    time_at_station,
+)
+from coramp.strategies.delays import delay_followers
+from coramp.strategies.ladder import plan_of
+from coramp.strategies.rungs import Merge, no_merge
+from coramp.strategies.situation import (
+    RUNG_DELAY,
+    RUNG_FREE,
+    RUNG_HOLD,
+    RUNG_REACH,
+    MergePlan,
+    Situation,
+    assess,
+    bounds_between_m,
+    conflict_position,
+    ramp_neighbours,
+)
+from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
+from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
+from coramp.strategies.slot_pushing import fall_back_behind
+
+ROOM = 128
+"""Vehicles that a plan may change: the subject and those behind it."""
+SAME_MPS = 1e-6
+NOSES = ((0.0, 0.0), (0.0, 0.1), (0.0, 0.25), (0.0, 0.5), (0.0, 1.0), (1.0, 0.0), (1.0, 0.5))
+"""How the nose is passed: how far from the ramp's speed to its limit and, behind it, how far from
+free movement's acceleration to the largest."""
+LONGEST_WAIT_S = 1e4
+
+
+class Wish(NamedTuple):
+    """What a ramp vehicle asks for: its foremost intercept and that of its claim (m).
+
+    With ``pushes`` mainline vehicles that cross after its claim fall back behind it. ``jerk_mps3``
+    is as in ``Manner``.
+    """
+
+    earliest_m: float
+    claim_m: float
+    pushes: bool
+    jerk_mps3: float
+
+
+class Place(NamedTuple):
+    """Where a merge is tried: gap of the lane order, intercept (m), who may have to fall back.
+
+    That is everyone of the lane order from ``first_behind`` on; nobody where it is its length.
+    """
+
+    gap: int
+    slot_m: float
+    first_behind: int
+    jerk_mps3: float
+
+
+@kernel
+def crossings_s(fleet: Fleet, row: int, now_s: float, packed_rules: FloatArray) -> float:
+    """Returns when (s) a ramp vehicle in free movement crosses the nose as if it were at v0."""
+    rules = unpacked(packed_rules)
+    out = np.empty((MAX_PIECES, 4))
+    from_s = now_s + rules.control.actuation_delay_s
+    _, _, slot_m = leave_stop_at(committed(fleet, row), from_s, from_s, out, rules)
+    return -slot_m / rules.road.mainline_speed_mps
+
+
+@kernel
+def plan_onto_lane(
+    fleet: Fleet,
+    row: int,
+    now_s: float,
+    claim_s: float,
+    pushes: bool,
+    jerk_mps3: float,
+    packed_rules: FloatArray,
+) -> tuple[MergePlan, Proposal, bool, int]:
+    """Returns a ramp vehicle's plan into the first slot that it can take, and its trajectories.
+
+    The slots tried lie in the gaps of the lane order, from its earliest backwards: that of free
+    movement or, for a vehicle that was held up, one nearer to the crossing time ``claim_s`` that it
+    would have had. With ``pushes`` the first one tried is behind all that cross before the claim,
+    and those behind it on the mainline fall back. The rest is what ``ramp_neighbours`` tells.
+    """
+    rules = unpacked(packed_rules)
+    proposal = empty_proposal(ROOM)
+    situation = assess(fleet, row, now_s, 0.0, rules)
+    blocked, behind = ramp_neighbours(fleet, row, situation.from_s)
+    conflict = conflict_position(fleet, situation, rules)
+    merge = no_merge()
+    if not blocked:
+        claim_m = -rules.road.mainline_speed_mps * claim_s
+        earliest_m = earliest_slot_m(fleet, situation, claim_m, rules)
+        wish = Wish(earliest_m, claim_m, pushes, jerk_mps3)
+        if pushes:
+            merge = slot_among(fleet, proposal, situation, wish, rules)
+        if merge.gap < 0:
+            merge = first_slot(fleet, proposal, situation, wish, rules)
+    rung = RUNG_HOLD
+    if merge.gap >= 0:
+        rung = RUNG_DELAY
+        if merge.largest_shift_m < KEEP_M:
+            rung = RUNG_FREE if merge.accel_mps2 == situation.free_accel_mps2 else RUNG_REACH
+    plan = plan_of(fleet, proposal, situation, merge, rung, 0, conflict, rules)
+    return plan, proposal, blocked, behind
+
+
+@kernel
+def earliest_slot_m(fleet: Fleet, situation: Situation, claim_m: float, rules: Rules) -> float:
+    """Returns the foremost intercept (m) that the subject may take.
+
+    A vehicle that was held up makes up for it at the ramp's limit and with the largest acceleration
+    behind the nose, but is never before its claim.
+    """
+    road, motion = rules.road, rules.motion
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    out = np.empty((MAX_PIECES, 4))
+    n = begin(out, situation.from_s, station_m, speed_mps)
+    n = change_speed(out, n, road.ramp_limit_mps, motion)
+    n = clip_end(out, n, time_at_station(out[:n], 0.0))
+    v0 = road.mainline_speed_mps
+    fastest_m = -v0 * out[n - 1, TIME] - lag_m(v0, out[n - 1, SPEED], motion.ramp_acceleration_mps2)
+    return float(max(situation.free_m, min(fastest_m, claim_m)))
+
+
+@kernel
+def first_slot(
+    fleet: Fleet, proposal: Proposal, situation: Situation, wish: Wish, rules: Rules
+) -> Merge:
+    """Proposes the first slot that the subject can take; ``gap`` is -1 where there is none."""
+    order, intercepts_m = situation.order, situation.intercepts_m
+    own_m = fleet.length_m[situation.subject] + situation.clearance_m
+    for gap in range(len(order) + 1):
+        low_m, high_m = bounds_between_m(
+            order, intercepts_m, fleet.length_m, gap, -math.inf, own_m, situation.clearance_m
+        )
+        first_m, failed_m = min(high_m, wish.earliest_m), -1.0
+        for setback_m in SETBACKS_M:
+            if first_m - setback_m < low_m:
+                break
+            place = Place(gap, first_m - setback_m, len(order), wish.jerk_mps3)
+            merge = merge_in_slot(fleet, proposal, situation, place, rules)
+            if merge.gap >= 0:
+                if failed_m < 0.0:
+                    return merge
+                return nearer_slot(fleet, proposal, situation, place, setback_m - failed_m, rules)
+            failed_m = setback_m
+    proposal.size[0] = 0
+    return no_merge()
+
+
+@kernel
+def nearer_slot(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    found: Place,
+    nearer_m: float,
+    rules: Rules,
+) -> Merge:
+    """Proposes the slot nearest to one that failed, ``nearer_m`` before one that was found."""
+    gain_m, step_m = 0.0, nearer_m
+    for _ in range(HALVINGS):
+        step_m *= 0.5
+        place = Place(
+            found.gap, found.slot_m + gain_m + step_m, found.first_behind, found.jerk_mps3
+        )
+        if merge_in_slot(fleet, proposal, situation, place, rules).gap >= 0:
+            gain_m += step_m
+    place = Place(found.gap, found.slot_m + gain_m, found.first_behind, found.jerk_mps3)
+    return merge_in_slot(fleet, proposal, situation, place, rules)
+
+
+@kernel
+def slot_among(
+    fleet: Fleet, proposal: Proposal, situation: Situation, wish: Wish, rules: Rules
+) -> Merge:
+    """Proposes the slot behind all that cross before the claim; who is behind it falls back."""
+    order, intercepts_m = situation.order, situation.intercepts_m
+    gap = 0
+    while gap < len(order) and intercepts_m[gap] >= wish.claim_m:
+        gap += 1
+    first_m = wish.earliest_m
+    if gap > 0:
+        ahead_m = intercepts_m[gap - 1] - fleet.length_m[order[gap - 1]] - situation.clearance_m
+        first_m = min(first_m, ahead_m)
+    for setback_m in PUSHING_SETBACKS_M:
+        place = Place(gap, first_m - setback_m, gap, wish.jerk_mps3)
+        merge = merge_in_slot(fleet, proposal, situation, place, rules)
+        if merge.gap >= 0:
+            return merge
+    return no_merge()
+
+
+@kernel
+def merge_in_slot(
+    fleet: Fleet, proposal: Proposal, situation: Situation, place: Place, rules: Rules
+) -> Merge:
+    """Proposes a merge into a place: a slower cruise on the ramp, or a later departure.
+
+    After a slower cruise the nose is passed at the ramp's speed. Where others are in the way, the
+    ramp's limit and higher accelerations behind the nose are tried: with these it is further behind
+    its leader on the ramp for the same slot.
+    """
+    road, motion = rules.road, rules.motion
+    free, most = situation.free_accel_mps2, motion.ramp_acceleration_mps2
+    behind_free_m = situation.free_m - place.slot_m
+    way = np.empty((MAX_PIECES, 4))
+    if abs(behind_free_m) < KEEP_M and merges_safely(
+        fleet, proposal, situation, situation.approach, free, place, rules
+    ):
+        return merge_of(proposal, place.gap, free, max(0.0, behind_free_m))
+    regained_s = leader_regains_s(fleet, situation, rules)
+    for faster, share in NOSES:
+        accel_mps2 = free + share * (most - free)
+        nose_mps = road.ramp_speed_mps + faster * (road.ramp_limit_mps - road.ramp_speed_mps)
+        lag = lag_m(road.mainline_speed_mps, nose_mps, accel_mps2)
+        nose_s = -(place.slot_m + lag) / road.mainline_speed_mps
+        if place.jerk_mps3 > 0.0:
+            n = smooth_on_ramp(fleet, situation, nose_s, nose_mps, place.jerk_mps3, way, rules)
+            if n > 0 and merges_safely(
+                fleet, proposal, situation, way[:n], accel_mps2, place, rules
+            ):
+                return merge_of(proposal, place.gap, accel_mps2, behind_free_m)
+        for end_s in (
+            nose_s,
+            regained_s + rules.safety.time_gap_s,
+            situation.from_s + 0.7 * (nose_s - situation.from_s),
+            situation.from_s + 0.4 * (nose_s - situation.from_s),
+        ):
+            if not situation.from_s < end_s <= nose_s:
+                continue
+            n = slow_on_ramp(fleet, situation, nose_s, nose_mps, end_s, way, rules)
+            if n > 0 and merges_safely(
+                fleet, proposal, situation, way[:n], accel_mps2, place, rules
+            ):
+                return merge_of(proposal, place.gap, accel_mps2, behind_free_m)
+    n, accel_mps2 = leave_stop_for_slot(fleet, situation, place.slot_m, way, rules)
+    if n > 0 and merges_safely(fleet, proposal, situation, way[:n], accel_mps2, place, rules):
+        return merge_of(proposal, place.gap, accel_mps2, behind_free_m)
+    return no_merge()
+
+
+@kernel
+def merge_of(proposal: Proposal, gap: int, accel_mps2: float, behind_free_m: float) -> Merge:
+    """Returns the merge that the proposal's first entry makes."""
+    pieces = proposed(proposal, 0)
+    merge_m = pieces[len(pieces) - 1, STATION]
+    return Merge(gap, accel_mps2, proposal.merge_time_s[0], merge_m, behind_free_m)
+
+
+@kernel
+def merges_safely(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    approach: FloatArray,
+    accel_mps2: float,
+    place: Place,
+    rules: Rules,
+) -> bool:
+    """Proposes an approach with its merge and what it asks of others; returns if all is safe.
+
+    Those behind on the ramp brake for their stops, those behind on the mainline fall back.
+    """
+    _, merge_m = propose_merge(proposal, situation.subject, approach, accel_mps2, rules)
+    if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
+        return False
+    if not delay_followers(fleet, proposal, situation, rules):
+        return False
+    if not fall_back_behind(fleet, proposal, situation, place.first_behind, place.slot_m, rules):
+        return False
+    unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
+    return bool(unsafe < 0)
+
+
+@kernel
+def leader_regains_s(fleet: Fleet, situation: Situation, rules: Rules) -> float:
+    """Returns when (s) the next vehicle ahead on the ramp is back at the ramp's speed for good.
+
+    When it passes the nose if it does so more slowly; infinity without such a vehicle.
+    """
+    own_m, _ = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    found, found_m = -1, math.inf
+    for row in fleet.live:
+        if situation.from_s < fleet.merge_time_s[row] < math.inf:
+            row_m, _ = station_and_speed(committed(fleet, row), situation.from_s)
+            if own_m < row_m < found_m:
+                found, found_m = row, row_m
+    if found < 0:
+        return math.inf
+    ahead = committed(fleet, found)
+    regained_s = ahead[0, TIME]
+    for k in range(len(ahead) - 1):
+        if ahead[k, SPEED] < rules.road.ramp_speed_mps - SAME_MPS and ahead[k, STATION] < 0.0:
+            regained_s = ahead[k + 1, TIME]
+    return float(regained_s)
+
+
+@kernel
+def slow_on_ramp(
+    fleet: Fleet,
+    situation: Situation,
+    nose_s: float,
+    nose_mps: float,
+    end_s: float,
+    out: FloatArray,
+    rules: Rules,
+) -> int:
+    """Writes the approach that passes the nose at ``nose_s`` with ``nose_mps``.
+
+    It goes to a slower speed at once and is back by ``end_s``. Returns its length, 0 where that
+    asks for less than ``slowest_ramp_speed_mps``.
+    """
+    motion = rules.motion
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    n = slow_phase(
+        out,
+        situation.from_s,
+        station_m,
+        speed_mps,
+        end_s,
+        -nose_mps * nose_s,
+        nose_mps,
+        motion.slow_down_mps2,
+        motion.speed_up_mps2,
+    )
+    if n == 0 or out[:n, SPEED].min() < min(speed_mps, motion.slowest_ramp_speed_mps):
+        return 0
+    return clip_end(out, n, max(out[n - 1, TIME], nose_s))
+
+
+@kernel
+def smooth_on_ramp(
+    fleet: Fleet,
+    situation: Situation,
+    nose_s: float,
+    nose_mps: float,
+    jerk_mps3: float,
+    out: FloatArray,
+    rules: Rules,
+) -> int:
+    """Writes the approach of least effort that passes the nose at ``nose_s`` with ``nose_mps``."""
+    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    n = least_effort_way(
+        out,
+        situation.from_s,
+        station_m,
+        speed_mps,
+        nose_s,
+        -nose_mps * nose_s,
+        nose_mps,
+        jerk_mps3,
+        rules.motion,
+    )
+    if n == 0 or out[:n, SPEED].min() < rules.motion.slowest_ramp_speed_mps:
+        return 0
+    if out[:n, SPEED].max() > rules.road.ramp_limit_mps + SAME_MPS:
+        return 0
+    return n
+
+
+@kernel
+def leave_stop_for_slot(
+    fleet: Fleet, situation: Situation, slot_m: float, out: FloatArray, rules: Rules
+) -> tuple[int, float]:
+    """Writes the approach that keeps to its commitment until it must leave it for the slot.
+
+    The later it speeds up to the ramp's speed, the later it comes; the time is found by halving.
+    Returns the approach's length, 0 for none, and the acceleration (m/s2) behind the nose.
+    """
+    before, from_s = committed(fleet, situation.subject), situation.from_s
+    if leave_stop_at(before, from_s, from_s, out, rules)[2] < slot_m - KEEP_M:
+        return 0, math.nan
+    early_s, late_s = from_s, from_s + 1.0
+    while leave_stop_at(before, from_s, late_s, out, rules)[2] > slot_m:
+        early_s, late_s = late_s, late_s + 2.0 * (late_s - from_s)
+        if late_s > from_s + LONGEST_WAIT_S:
+            return 0, math.nan
+    while late_s - early_s > 1e-9 * late_s:
+        middle_s = 0.5 * (early_s + late_s)
+        if leave_stop_at(before, from_s, middle_s, out, rules)[2] > slot_m:
+            early_s = middle_s
+        else:
+            late_s = middle_s
+    n, accel_mps2, _ = leave_stop_at(before, from_s, late_s, out, rules)
+    return n, accel_mps2
+
+
+@kernel
+def leave_stop_at(
+    before: FloatArray, from_s: float, leave_s: float, out: FloatArray, rules: Rules
+) -> tuple[int, float, float]:
+    """Writes the approach that leaves a commitment at ``leave_s`` for the ramp's speed.
+
+    Returns its length, the acceleration (m/s2) behind the nose, free movement's within Eq. 22, and
+    the intercept (m) that it ends on.
+    """
+    road, motion = rules.road, rules.motion
+    v0 = road.mainline_speed_mps
+    n = clip_start(before, from_s, out)
+    n = clip_end(out, n, leave_s)
+    n = change_speed(out, n, road.ramp_speed_mps, motion)
+    n = clip_end(out, n, time_at_station(out[:n], 0.0))
+    nose_s, nose_mps = out[n - 1, TIME], out[n - 1, SPEED]
+    least = least_acceleration_mps2(v0, nose_mps, road.last_merge_station_m)
+    accel_mps2 = min(max(motion.free_acceleration_mps2, least), motion.ramp_acceleration_mps2)
+    return n, accel_mps2, -v0 * nose_s - lag_m(v0, nose_mps, accel_mps2)
