@@ -22,7 +22,7 @@ def test_everything_that_is_built_in_is_listed_and_described():
 
 def test_what_the_design_promises_is_built_in():
     assert {"paper", "expressway"} <= set(builtin_names("scenarios"))
-    assert {"paper", "sensitivity", "capacity", "field", "baseline"} <= set(
+    assert {"paper", "sensitivity", "capacity", "field", "baseline", "drivers"} <= set(
         builtin_names("studies")
     )
     assert "example" in builtin_names("snapshots")

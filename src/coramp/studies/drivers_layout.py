@@ -18,7 +18,7 @@ ROADS = (
     ("the same with ramp metering; three, four lanes", "2248, 2132", "", "the same"),
     ("two bottlenecks near Toronto", "", "about 10", "Cassidy and Bertini 1999"),
     ("three bottlenecks", "", "3 to 18", "Chung et al. 2007, at second hand"),
-    ("three bottlenecks in California", "", "none", "Anderson and Davis 2020"),
+    ("three bottlenecks", "", "none", "Anderson and Davis 2020, at second hand"),
 )
 NOTE = (
     "Means over the seeds that broke down, with 95 % intervals. Breakdown: mean speed at the "
