@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import polars as pl
 
 from coramp.studies.breakdown import BREAKDOWN_DELAY_S, broke_down
+from coramp.studies.lane_breakdown import Key, lane_flows_veh_h
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 
@@ -32,6 +33,13 @@ class Breakdown:
     lowest_veh_h: float
     highest_veh_h: float
     limit_veh_h: float | None = None
+    scenario: str = ""
+    seeds: tuple[int, ...] = ()
+
+    @property
+    def by_seed(self) -> list[tuple[int, float]]:
+        """Seeds with their breakdown flow (veh/h), where it lies within the range."""
+        return list(zip(self.seeds, self.flows, strict=True))
 
     @property
     def estimate(self) -> Estimate:
@@ -70,8 +78,10 @@ def _breakdown(
     strategy: str, drivers: str | None, overrides: str | None, ramp: float, group: pl.DataFrame
 ) -> Breakdown:
     low, high = _range(group)
-    flows, above, below = [], 0, 0
-    for _, runs in group.group_by("seed", maintain_order=True):
+    flows: list[float] = []
+    seeds: list[int] = []
+    above, below = 0, 0
+    for (seed,), runs in group.group_by(["seed"], maintain_order=True):
         broken = min(_broken_flows(runs), default=math.inf)
         if broken == low:
             below += 1
@@ -79,6 +89,7 @@ def _breakdown(
             above += 1
         else:
             flows.append(broken)
+            seeds.append(int(str(seed)))
     limit_veh_h = group["lane_limit_veh_h"].max() if "lane_limit_veh_h" in group.columns else None
     return Breakdown(
         strategy,
@@ -91,6 +102,8 @@ def _breakdown(
         low,
         high,
         limit_veh_h if isinstance(limit_veh_h, float) else None,
+        str(group["scenario"][0]),
+        tuple(seeds),
     )
 
 
@@ -105,8 +118,66 @@ def _broken_flows(runs: pl.DataFrame) -> Iterator[float]:
             yield run["mainline_veh_h"]
 
 
-def capacity_tables(good: pl.DataFrame) -> list[Table]:
-    """Returns one row a combination: its breakdown flow at each ramp flow."""
+def capacity_tables(good: pl.DataFrame, horizon_s: float | None = None) -> list[Table]:
+    """Returns each combination's breakdown flow at each ramp flow, then beside the lane's own.
+
+    ``horizon_s`` is the study's, where it sets one.
+    """
+    return [*_flows(good), *_beside_the_lane(good, horizon_s)]
+
+
+def _beside_the_lane(good: pl.DataFrame, horizon_s: float | None) -> list[Table]:
+    """One row a combination: its breakdown flow over that of the bound, of the seed worst off."""
+    lane = lane_flows_veh_h(good, horizon_s)
+    found = [b for b in breakdowns(good) if b.drivers is None]
+    if not lane or not found:
+        return []
+    ramps = sorted({b.ramp_veh_h for b in found})
+    rows = [
+        (f"the bound, {gaps}", *(_lane_cell(lane, overrides, ramp) for ramp in ramps))
+        for overrides, gaps in {b.overrides: b.name.partition(", ")[2] for b in found}.items()
+    ]
+    for name in dict.fromkeys(b.name for b in found):
+        cells = {b.ramp_veh_h: _beside_cell(lane, b) for b in found if b.name == name}
+        rows.append((name, *(cells.get(ramp, "-") for ramp in ramps)))
+    columns = ("strategy, gaps", *(f"ramp {ramp:g}" for ramp in ramps))
+    note = (
+        f"The bound: the mainline flow (veh/h) at which the least mean delay of all vehicles on the "
+        f"same arrivals passes {BREAKDOWN_DELAY_S:g} s, mean over seeds. Strategies: their flow at "
+        "breakdown as a share of it, of the seed worst off; in brackets mainline and ramp flow "
+        "together as a share of what the lane carries, mean over seeds. Above and below: outside "
+        "the flows tried."
+    )
+    return [Table("Breakdown flow beside the lane's own", columns, tuple(rows), (note,))]
+
+
+def _lane_cell(lane: dict[Key, float], overrides: str | None, ramp_veh_h: float) -> str:
+    flows = [
+        flow
+        for (_, said, ramp, _), flow in lane.items()
+        if (said, ramp) == (overrides or "", ramp_veh_h)
+    ]
+    known = [flow for flow in flows if math.isfinite(flow)]
+    return number(sum(known) / len(known), 0) if len(known) == len(flows) and known else "above"
+
+
+def _beside_cell(lane: dict[Key, float], found: Breakdown) -> str:
+    if found.above:
+        return "above"
+    if found.below:
+        return "below"
+    shares = [
+        flow / lane[found.scenario, found.overrides or "", found.ramp_veh_h, seed]
+        for seed, flow in found.by_seed
+    ]
+    text = f"{100.0 * min(shares):.0f} %"
+    if found.limit_veh_h:
+        both = sum(found.flows) / len(found.flows) + found.ramp_veh_h
+        text += f" ({100.0 * both / found.limit_veh_h:.0f} %)"
+    return text
+
+
+def _flows(good: pl.DataFrame) -> list[Table]:
     found = breakdowns(good)
     ramps = sorted({b.ramp_veh_h for b in found})
     rows = []

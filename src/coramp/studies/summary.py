@@ -19,7 +19,6 @@ from coramp.studies.tables import Table, number, with_interval
 LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "paper": paper_tables,
     "sensitivity": sensitivity_tables,
-    "capacity": capacity_tables,
     "field": field_tables,
     "baseline": baseline_tables,
     "drivers": drivers_tables,
@@ -30,8 +29,12 @@ GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh
 def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
     """Returns a study's tables: those of its layout, then every group of runs, then promises."""
     good = runs.filter(status="ok")
-    make = LAYOUTS.get(study.layout)
-    return [*(make(good) if make is not None else ()), overview(good), promises(runs)]
+    if study.layout == "capacity":
+        own = capacity_tables(good, study.horizon_s)
+    else:
+        make = LAYOUTS.get(study.layout)
+        own = make(good) if make is not None else []
+    return [*own, overview(good), promises(runs)]
 
 
 def overview(good: pl.DataFrame) -> Table:
