@@ -4,6 +4,7 @@ On the same arrivals as a study's searches, by bisection between the same flows,
 """
 
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def lane_flows_veh_h(good: pl.DataFrame, horizon_s: float | None) -> dict[Key, f
     flows = sorted(good["mainline_veh_h"].unique().to_list())
     if cooperative.is_empty() or len(flows) < 2:
         return {}
-    resolution = min(b - a for a, b in zip(flows[:-1], flows[1:], strict=True))
+    resolution = min(b - a for a, b in pairwise(flows))
     steps = round((flows[-1] - flows[0]) / resolution)
     keys = cooperative.select("scenario", "overrides", "ramp_veh_h", "seed").unique()
     found: dict[Key, float] = {}
