@@ -30,8 +30,8 @@ def test_nobody_loses_much_well_below_the_limit_of_the_lane(strategy, time_gap_s
 
 @pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
 def test_a_queue_on_the_ramp_does_not_wait_until_the_mainline_is_empty(strategy):
-    # one vehicle every 1.4 s on each road are more than the lane takes at 1.26 s each, so that one or
-    # the other stands; with the whole mainline first the ramp would lose 31 s
+    # one vehicle every 1.4 s on each road are more than the lane takes at 1.26 s each, so that one
+    # or the other stands; with the whole mainline first the ramp would lose 31 s
     arrivals = [
         {"stream": "ramp", "time_s": round(1.4 * k, 1), "speed_mps": 16.0} for k in range(20)
     ]
