@@ -29,8 +29,9 @@ def test_nobody_loses_much_well_below_the_limit_of_the_lane(strategy, time_gap_s
 
 
 @pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
-def test_a_ramp_that_starts_as_a_queue_lets_a_vehicle_go_in_less_than_four_seconds(strategy):
-    # while both streams enter every 1.4 s the lane cannot serve the ramp, so that a queue stands
+def test_a_queue_on_the_ramp_does_not_wait_until_the_mainline_is_empty(strategy):
+    # one vehicle every 1.4 s on each road are more than the lane takes at 1.26 s each, so that one
+    # or the other stands; with the whole mainline first the ramp would lose 31 s
     arrivals = [
         {"stream": "ramp", "time_s": round(1.4 * k, 1), "speed_mps": 16.0} for k in range(20)
     ]
@@ -43,7 +44,6 @@ def test_a_ramp_that_starts_as_a_queue_lets_a_vehicle_go_in_less_than_four_secon
         engine="exact",
         overrides={"safety.time_gap_s": 1.0, "arrivals": arrivals + block},
     )
-    merges_s = run.decisions["merge_time_s"].drop_nulls().drop_nans().sort()
-    assert len(merges_s) == 20
+    assert run.summary["vehicles_ramp"] == 20
     assert run.summary["unserved"] == 0
-    assert (merges_s[-1] - merges_s[0]) / 19 < 4.0
+    assert run.summary["ramp_delay_s"] < 20.0
