@@ -308,7 +308,8 @@ class Scenario(Model):
         if self.motion.slow_deviation is not None:
             return self.motion.slow_deviation
         deviation = self.motion.speed_deviation
-        wider = deviation * (1.0 + SLOWER_PER_TIME_GAP_PS * self.safety.time_gap_s)
+        gap_s = self.safety.time_gap_s + self.safety.standstill_gap_m / self.mainline.speed_mps
+        wider = deviation * (1.0 + SLOWER_PER_TIME_GAP_PS * gap_s)
         return max(deviation, min(wider, SLOWEST_DEVIATION))
 
     @property

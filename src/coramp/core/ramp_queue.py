@@ -18,7 +18,8 @@ from coramp.core.fleet import (
     pair_margin_m,
     trajectory_under,
 )
-from coramp.core.rules import Rules, SafetyBudget
+from coramp.core.rules import Rules
+from coramp.core.safe_distance import gap_time_s
 from coramp.core.trajectory import station_and_speed
 
 
@@ -39,9 +40,7 @@ def propose_stop(
     station_m, speed_mps = station_and_speed(before, from_s)
     out = proposal.pieces[entry]
     step_s = rules.control.step_s
-    most = math.ceil(
-        (speed_mps / rules.motion.slow_down_mps2 + longest_wait_s(rules.safety)) / step_s
-    )
+    most = math.ceil((speed_mps / rules.motion.slow_down_mps2 + longest_wait_s(rules)) / step_s)
     too_short, enough, steps = -1, most + 1, 0
     while enough - too_short > 1:
         n = _stop_after_brake(out, from_s, station_m, speed_mps, steps * step_s, stop_m, rules)
@@ -58,13 +57,13 @@ def propose_stop(
 
 
 @kernel
-def longest_wait_s(safety: SafetyBudget) -> float:
+def longest_wait_s(rules: Rules) -> float:
     """Returns for how long (s) a vehicle in a queue may have to stand until it can go on.
 
     In a queue that starts, each vehicle follows the way of the one ahead a time gap later. By the
     distances of Eq. 1 alone all can start at once.
     """
-    return MAX_CHANGED * safety.time_gap_s
+    return MAX_CHANGED * gap_time_s(rules)
 
 
 @kernel

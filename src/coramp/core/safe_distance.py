@@ -7,7 +7,7 @@ Eq. 3's ``v^2 / (254 (phi + psi))`` with v in km/h is ``(3.6 v)^2 / (254 (phi + 
 import math
 
 from coramp._kernel import kernel
-from coramp.core.rules import Road, SafetyBudget
+from coramp.core.rules import Road, Rules, SafetyBudget
 
 KM_H_PER_MPS = 3.6
 BRAKING_CONSTANT = 254.0
@@ -130,3 +130,9 @@ def standing_clearance_m(road: Road, safety: SafetyBudget, stop_mps2: float) -> 
     if spare_per_square > 0.0:
         speed_mps = min(speed_mps, 0.5 * per_speed_s / spare_per_square)
     return still_m + speed_mps * (per_speed_s - spare_per_square * speed_mps)
+
+
+@kernel
+def gap_time_s(rules: Rules) -> float:
+    """Returns T_g + d_0 / v_0 (s), what the time gap and the standstill gap ask for at v_0."""
+    return rules.safety.time_gap_s + rules.safety.standstill_gap_m / rules.road.mainline_speed_mps

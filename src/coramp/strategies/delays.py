@@ -19,6 +19,7 @@ from coramp.core.proposals import find_unsafe_pair, propose_merge, push_back
 from coramp.core.ramp_acceleration import lag_m
 from coramp.core.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
 from coramp.core.rules import Rules
+from coramp.core.safe_distance import gap_time_s
 from coramp.core.trajectory import MAX_PIECES, station_and_speed
 from coramp.strategies.rungs import Merge, no_merge, unknown_bound_m
 from coramp.strategies.situation import Situation, gap_bounds_m, situation_from
@@ -58,10 +59,10 @@ def delay_and_create(
 ) -> Merge:
     """Rung delay with gap creation: come late to a gap whose rear vehicle falls back (scenario 2).
 
-    By no more than what the time gaps before and behind the subject ask for; the safe distances of
-    the paper alone leave gaps enough.
+    By no more than what the time and standstill gaps before and behind the subject ask for; the
+    safe distances of the paper alone leave gaps enough.
     """
-    room_m = 2.0 * rules.safety.time_gap_s * rules.road.mainline_speed_mps
+    room_m = 2.0 * gap_time_s(rules) * rules.road.mainline_speed_mps
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
     if room_m <= 0.0 or low_m <= min(high_m, situation.free_m):
         return no_merge()
@@ -94,7 +95,7 @@ def come_late(
         gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
     ):
         return no_merge()
-    if longest_wait_s(rules.safety) > 0.0:
+    if longest_wait_s(rules) > 0.0:
         for way in (AT_ONCE, AT_THE_STOP):
             merge = come_late_by(fleet, proposal, situation, gap, way, target_m, back_m, rules)
             if merge.gap >= 0:
@@ -191,7 +192,7 @@ def late_way(
         if n == 0:
             return 0
         wait_s = (with_approach(situation, out[:n], rules).free_m - target_m) / v0
-        if not 0.0 < wait_s <= longest_wait_s(rules.safety):
+        if not 0.0 < wait_s <= longest_wait_s(rules):
             return 0
         return late_start(before, from_s, wait_s, road, motion, out)
     station_m, speed_mps = station_and_speed(before, from_s)
