@@ -142,7 +142,7 @@ def _beside_the_lane(good: pl.DataFrame, horizon_s: float | None) -> list[Table]
         rows.append((name, *(cells.get(ramp, "-") for ramp in ramps)))
     columns = ("strategy, gaps", *(f"ramp {ramp:g}" for ramp in ramps))
     note = (
-        f"The bound: the mainline flow (veh/h) at which the least mean delay of all vehicles on the "
+        "The bound: the mainline flow (veh/h) at which the least mean delay of all vehicles on the "
         f"same arrivals passes {BREAKDOWN_DELAY_S:g} s, mean over seeds. Strategies: their flow at "
         "breakdown as a share of it, of the seed worst off; in brackets mainline and ramp flow "
         "together as a share of what the lane carries, mean over seeds. Above and below: outside "
