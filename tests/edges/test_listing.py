@@ -21,8 +21,8 @@ def test_everything_that_is_built_in_is_listed_and_described():
 
 
 def test_what_the_design_promises_is_built_in():
-    assert {"paper", "expressway"} <= set(builtin_names("scenarios"))
-    assert {"paper", "sensitivity", "capacity", "field", "baseline", "drivers"} <= set(
+    assert {"paper", "expressway", "motorway"} <= set(builtin_names("scenarios"))
+    assert {"paper", "sensitivity", "capacity", "field", "baseline", "drivers", "worth"} <= set(
         builtin_names("studies")
     )
     assert "example" in builtin_names("snapshots")
@@ -35,6 +35,7 @@ def test_what_the_design_promises_is_built_in():
         "game",
         "virtual-platoon",
         "ocbf",
+        "slots",
         "alinea",
         "uncontrolled",
     ]

@@ -49,15 +49,15 @@ class Breakdown:
     @property
     def name(self) -> str:
         """The combination in words."""
-        gap = _gaps(self.overrides or "")
+        gap = gaps_in_words(self.overrides or "")
         who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
         if self.drivers:
             return who
         return f"{who}, {gap or 'Eq. 1'}"
 
 
-def _gaps(overrides: str) -> str:
-    """Overrides in words; gaps by their values alone."""
+def gaps_in_words(overrides: str) -> str:
+    """Returns overrides in words; gaps by their values alone."""
     words = []
     for override in overrides.split():
         key, _, value = override.partition("=")

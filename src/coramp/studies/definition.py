@@ -104,9 +104,9 @@ class Study(Model):
     description: str = ""
     scenario: str
     seeds: Annotated[int, Field(ge=1, le=100000)] = 3
-    layout: Literal["plain", "paper", "sensitivity", "capacity", "field", "baseline", "drivers"] = (
-        "plain"
-    )
+    layout: Literal[
+        "plain", "paper", "sensitivity", "capacity", "field", "baseline", "drivers", "worth"
+    ] = "plain"
     horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
     runs: Annotated[tuple[Grid, ...], Field(strict=False)] = ()
     searches: Annotated[tuple[Search, ...], Field(strict=False)] = ()

@@ -15,6 +15,7 @@ from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
+from coramp.studies.worth_layout import worth_tables
 
 LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "paper": paper_tables,
@@ -22,6 +23,7 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "field": field_tables,
     "baseline": baseline_tables,
     "drivers": drivers_tables,
+    "worth": worth_tables,
 }
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
