@@ -28,6 +28,7 @@ def outcome(groups, ramp=False):
         np.full(count, ramp),
         np.full(count, 5.0),
         entry_s,
+        speed_mps,
         entry_s,
         np.full(count, -np.inf),
         exit_s,
