@@ -18,6 +18,9 @@ from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, plan_in_lane
 from coramp.strategies.slot_onto_lane import crossings_s, plan_onto_lane
 
 ON_TIME_S = 1e-6
+SHARED = ("first-come", "least-delay")
+QUEUE_S = 5.0
+"""Up to such a wait the lane is not beyond its limit: who could cross next has the slot."""
 SLOWEST_ENTRY_SHARE = SLOWEST_SHARE + 0.1
 """Of v0: below it a mainline vehicle waits outside. What is lost inside is lost at higher speeds,
 and the entrance carries less the slower it is passed."""
@@ -165,6 +168,8 @@ class Slots:
         both_late = min(waited_s, late_s) > 0.0
         if self.order == "least-delay" and both_late and length_m != claim.length_m:
             return claim.length_m < length_m
+        if self.order in SHARED and max(waited_s, late_s) <= QUEUE_S:
+            return True
         share = {"mainline-first": 0.0, "ramp-first": 1.0}.get(self.order, self.ramp_share)
         if waiting.first(on_ramp=True) >= 0:
             share = max(share, 0.5)

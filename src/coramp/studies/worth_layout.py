@@ -14,7 +14,7 @@ DELAYS_NOTE = (
 )
 FLOW_NOTE = (
     "Delays and fuel are means over seeds, the rest are sums over seeds but for the smallest TTC. "
-    "Brakings: at least 0.2 s beyond 3 and 4.5 m/s2. Stopped: below 0.1 m/s between entry and merge."
+    "Brakings: 0.2 s or more beyond 3 and 4.5 m/s2. Stopped: below 0.1 m/s from entry to merge."
 )
 
 
