@@ -22,9 +22,16 @@ def test_everything_that_is_built_in_is_listed_and_described():
 
 def test_what_the_design_promises_is_built_in():
     assert {"paper", "expressway", "motorway"} <= set(builtin_names("scenarios"))
-    assert {"paper", "sensitivity", "capacity", "field", "baseline", "drivers", "worth"} <= set(
-        builtin_names("studies")
-    )
+    assert {
+        "paper",
+        "sensitivity",
+        "capacity",
+        "field",
+        "baseline",
+        "drivers",
+        "worth",
+        "motorway",
+    } <= set(builtin_names("studies"))
     assert "example" in builtin_names("snapshots")
     assert list(strategies()) == [
         "mainline-priority",

@@ -104,7 +104,7 @@ def test_the_table_has_means_and_says_what_lies_outside():
     # t of 0.975 with one degree of freedom is 12.7062, the standard error 50
     assert inside.estimate.half_width == pytest.approx(635.31, abs=0.01)
     assert (below.flows, below.below) == ((), 1)
-    (table,) = capacity_tables(runs)
+    table = capacity_tables(runs)[0]
     assert table.rows == (
         (
             "mainline-priority, Eq. 1",
@@ -127,7 +127,7 @@ def test_the_table_has_means_and_says_what_lies_outside():
 def test_combinations_are_named_by_their_gaps(overrides, name):
     given = {"overrides": overrides, "lane_limit_veh_h": 2604.9}
     runs = runs_of(*({**row, **given} for row in rows(1, 1500.0)))
-    (table,) = capacity_tables(runs)
+    table = capacity_tables(runs)[0]
     assert table.rows == ((name, "2605", "1500"),)
 
 
@@ -169,5 +169,10 @@ def test_what_cannot_be_searched_is_told(tmp_path):
 
 def test_the_built_in_study_is_as_large_as_it_says():
     study = load_study("capacity")
-    assert len(bisections(study, 3, "capacity")) == 120
-    assert count_runs(study, 3) == 120 * (2 + math.ceil(math.log2(36)))
+    # three strategies at eight gaps, six populations of drivers, three ramp flows, three seeds
+    assert len(bisections(study, 3, "capacity")) == (3 * 8 + 6) * 3 * 3
+    most = sum(
+        9 * len(search.strategies) * len(search.drivers) * (2 + math.ceil(math.log2(search.steps)))
+        for search in study.searches
+    )
+    assert count_runs(study, 3) == most
