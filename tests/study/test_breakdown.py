@@ -56,15 +56,18 @@ def searched(breaks_from_veh_h):
 @given(st.floats(900.0, 2200.0))
 def test_the_search_ends_with_neighbours_on_both_sides_of_the_breakdown(truth):
     asked = searched(truth)
-    assert len(asked) == len(set(asked)) <= 6
+    assert len(asked) == len(set(asked)) <= 4
     broken = [flow for flow in asked if flow >= truth]
     good = [flow for flow in asked if flow < truth]
     if broken and good:
         assert min(broken) - max(good) == pytest.approx(100.0)
 
 
-@pytest.mark.parametrize(("truth", "asked"), [(500.0, [1000.0]), (3000.0, [1000.0, 2000.0])])
-def test_outside_the_range_the_ends_are_enough(truth, asked):
+@pytest.mark.parametrize(
+    ("truth", "asked"),
+    [(500.0, [1500.0, 1200.0, 1000.0]), (3000.0, [1500.0, 1800.0, 1900.0, 2000.0])],
+)
+def test_an_end_of_the_range_is_run_only_where_nothing_else_tells(truth, asked):
     assert searched(truth) == asked
 
 
@@ -172,7 +175,7 @@ def test_the_built_in_study_is_as_large_as_it_says():
     # three strategies at eight gaps, six populations of drivers, three ramp flows, three seeds
     assert len(bisections(study, 3, "capacity")) == (3 * 8 + 6) * 3 * 3
     most = sum(
-        9 * len(search.strategies) * len(search.drivers) * (2 + math.ceil(math.log2(search.steps)))
+        9 * len(search.strategies) * len(search.drivers) * math.ceil(math.log2(search.steps + 2))
         for search in study.searches
     )
     assert count_runs(study, 3) == most

@@ -29,14 +29,10 @@ class Bisection:
         """Returns the run whose result is needed next, None once the search has ended.
 
         ``result_of`` gives a run's row, None for one that is not done. A run that failed ends it.
+        The ends of the range are run only where everything between them broke down, or nothing did:
+        far beyond the limit runs take longest.
         """
-        low, high = 0, self.search.steps
-        for step in (low, high):
-            broken = self._broken(step, result_of)
-            if broken is None:
-                return self._unless_failed(step, result_of)
-            if broken == (step == low):
-                return None
+        low, high = -1, self.search.steps + 1
         while high - low > 1:
             middle = (low + high) // 2
             broken = self._broken(middle, result_of)

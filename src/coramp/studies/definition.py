@@ -88,8 +88,8 @@ class Search(Model):
 
     @property
     def runs_at_most(self) -> int:
-        """How many runs a search takes at most: both ends, then halves."""
-        return 2 + max(0, self.steps - 1).bit_length()
+        """How many runs a search takes at most: halves of all flows, both ends included."""
+        return (self.steps + 1).bit_length()
 
     def flow_veh_h(self, step: int) -> float:
         """Returns the mainline flow of a step; the last is the upper end."""
