@@ -215,6 +215,8 @@ class Coordinator:
 
     def _moves_up_in_time(self, row: int, step: int, before_step: int) -> None:
         """Moves a vehicle up whose stop would begin before a step, if it can."""
+        if self.ledger.merge_time_s(row) < math.inf:
+            return
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
 
