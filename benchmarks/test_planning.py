@@ -40,7 +40,7 @@ def decision_times_ms(strategy, mainline, ramp, seeds):
     return np.array(times)
 
 
-@pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
+@pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority", "slots"])
 def test_decisions_stay_quick_at_high_flows(benchmark, strategy):
     decision_times_ms(strategy, 3600, 1500, (1,))  # compiles what is not cached
     low = decision_times_ms(strategy, 800, 200, range(1, 6))

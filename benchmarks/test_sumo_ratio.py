@@ -19,6 +19,8 @@ from coramp.strategies.registry import strategy_named
 ROUNDS = 9
 SUMO_AT_MOST = 1.15
 EXACT_AT_LEAST = 20.0
+SLOTS_AT_LEAST = 8.0
+"""Slots plans every vehicle, not those of the ramp alone."""
 
 
 @pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
@@ -74,3 +76,37 @@ def test_exact_run_against_plain_sumo(benchmark, tmp_path):
         f"(at least {EXACT_AT_LEAST:g}), {over_sumo:.1f} times as fast as a run in SUMO"
     )
     assert ratio >= EXACT_AT_LEAST
+
+
+@pytest.mark.parametrize("time_gap_s", [0.0, 1.0])
+def test_exact_run_of_slots_against_plain_sumo(benchmark, tmp_path, time_gap_s):
+    spec = make_spec(
+        "paper",
+        "slots",
+        engine="exact",
+        mainline_veh_h=1800,
+        ramp_veh_h=500,
+        overrides={"safety.time_gap_s": time_gap_s},
+    )
+    strategy = strategy_named(spec.strategy)()
+    run_cooperative(spec.scenario, strategy, 1, SumoOptions(keep_in=tmp_path / "kept"))
+    execute(spec)
+    exact, plain = [], []
+
+    def one_round():
+        plain.append(plain_sumo_s(tmp_path / "kept"))
+        times = []
+        for _ in range(5):
+            started = time.perf_counter()
+            execute(spec)
+            times.append(time.perf_counter() - started)
+        exact.append(statistics.median(times))
+
+    benchmark.pedantic(one_round, rounds=ROUNDS, iterations=1)
+    ratio = statistics.median(p / e for e, p in zip(exact, plain, strict=True))
+    print(
+        f"\nexact engine, slots at {time_gap_s:g} s, 1800 + 500 veh/h, 1800 s: "
+        f"{statistics.median(exact) * 1e3:.1f} ms, {ratio:.1f} times as fast as plain sumo "
+        f"(at least {SLOTS_AT_LEAST:g} at Eq. 1)"
+    )
+    assert time_gap_s > 0.0 or ratio >= SLOTS_AT_LEAST
