@@ -284,7 +284,7 @@ class Coordinator:
             )
             for k in range(int(proposal.size[0]))
         ]
-        if row not in [move.row for move in moves]:
+        if not moves or not (self._asks_at_entry or row in [move.row for move in moves]):
             return False
         verdict = self._examiner.change(self.ledger, moves, from_s)
         if verdict.code != ACCEPTED:
@@ -314,9 +314,7 @@ class Coordinator:
         )
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
-        view = self.view(subjects, step)
-        self._told_of_entries = len(self.ledger)
-        decision = self._strategy.decide(view, self._memory)
+        decision = self._strategy.decide(self.view(subjects, step), self._memory)
         self.carry_out(decision, subjects, step)
 
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
@@ -347,6 +345,7 @@ class Coordinator:
             for command in trajectories:
                 self._commit(command.row, command.pieces, command.merge_time_s, step)
         self._memory = decision.memory
+        self._told_of_entries = len(self.ledger)
         self._record(decision, trajectories, time_s, margin_m)
         for wake_s, row in decision.wakes_s:
             wake_step = first_step_from(wake_s, self._step_s)

@@ -78,7 +78,7 @@ class Place(NamedTuple):
 
 
 @kernel
-def crossings_s(fleet: Fleet, row: int, now_s: float, packed_rules: FloatArray) -> float:
+def crossing_of_s(fleet: Fleet, row: int, now_s: float, packed_rules: FloatArray) -> float:
     """Returns when (s) a ramp vehicle in free movement crosses the nose as if it were at v0."""
     rules = unpacked(packed_rules)
     out = np.empty((MAX_PIECES, 4))

@@ -10,12 +10,19 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from coramp._kernel import FloatArray
-from coramp.strategies.base import Decision, EntryPolicy, FollowTrajectory, Memory, View
+from coramp.strategies.base import (
+    Decision,
+    Entered,
+    EntryPolicy,
+    FollowTrajectory,
+    Memory,
+    View,
+)
 from coramp.strategies.ladder import explanation, held
 from coramp.strategies.parameters import choice, parameter
 from coramp.strategies.situation import RUNG_HOLD
 from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, plan_in_lane
-from coramp.strategies.slot_onto_lane import crossings_s, plan_onto_lane
+from coramp.strategies.slot_onto_lane import crossing_of_s, plan_onto_lane
 
 ON_TIME_S = 1e-6
 SHARED = ("first-come", "least-delay")
@@ -35,6 +42,7 @@ class Claim:
     """
 
     row: int
+    entered_s: float
     crossing_s: float
     length_m: float
     late_known: bool
@@ -76,7 +84,8 @@ class Slots:
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the slot of the first subject, or when it is to be asked again."""
-        claims: tuple[Claim, ...] = memory if isinstance(memory, tuple) else ()
+        known: tuple[Claim, ...] = memory if isinstance(memory, tuple) else ()
+        claims = (*known, *(claim_of(view, e) for e in view.entered if e.on_ramp))
         row = first_to_plan(view)
         rest = tuple((view.time_s, other) for other in view.subjects if other != row)
         merge_s = float(view.fleet.merge_time_s[row])
@@ -98,19 +107,18 @@ class Slots:
 
     def _onto_lane(self, view: View, row: int, claims: tuple[Claim, ...]) -> Decision:
         """The slot of a ramp vehicle, once it is its turn."""
-        claim = next((known for known in claims if known.row == row), None)
-        if claim is None:
-            claim = claim_of(view, row)
-            claims = (*claims, claim)
+        claim = next(known for known in claims if known.row == row)
         due_s = self._due_s(view, claim)
         if due_s > view.time_s + ON_TIME_S:
             wakes = ((due_s, row),) if due_s < math.inf else ()
             return Decision((), wakes, claims)
         waiting = tuple(replace(c, waits=True) if c.row == row else c for c in claims)
+        if row != claims[0].row:  # it is asked about again once those ahead have their slots
+            return Decision((), (), waiting)
         again = ((view.time_s + view.rules.control.retry_s, row),)
         if not self._goes_now(view, claim):
             return Decision((), again, waiting)
-        plan, proposal, blocked, behind = plan_onto_lane(
+        plan, proposal, _, _ = plan_onto_lane(
             view.fleet,
             row,
             view.time_s,
@@ -119,9 +127,9 @@ class Slots:
             self._most_jerk,
             view.packed_rules,
         )
-        if blocked or plan.rung == RUNG_HOLD:
+        if plan.rung == RUNG_HOLD:
             story = () if claim.waits else (held(row, plan),)
-            return Decision((), () if blocked else again, waiting, story)
+            return Decision((), again, waiting, story)
         commands = tuple(
             FollowTrajectory(
                 int(proposal.rows[k]),
@@ -131,8 +139,8 @@ class Slots:
             )
             for k in range(int(proposal.size[0]))
         )
-        left = tuple(known for known in claims if known.row != row)
-        follow_up = tuple((view.time_s, c.row) for c in left if c.row == behind and c.waits)
+        left = claims[1:]
+        follow_up = tuple((view.time_s, next_one.row) for next_one in left[:1] if next_one.waits)
         return Decision(commands, follow_up, left, (explanation(row, plan),))
 
     @property
@@ -150,8 +158,7 @@ class Slots:
         if self.order == "ramp-first" or claim.waits:
             return view.time_s
         if self.order == "mainline-first":
-            entered_now = any(entered.row == claim.row for entered in view.entered)
-            return math.inf if entered_now else view.time_s
+            return math.inf if view.time_s <= claim.entered_s else view.time_s
         return claim.crossing_s - time_ahead_s(view)
 
     def _goes_now(self, view: View, claim: Claim) -> bool:
@@ -190,15 +197,16 @@ def time_ahead_s(view: View) -> float:
     return -(rules.road.mainline_start_m + excess_mps * delay_s) / v0
 
 
-def claim_of(view: View, row: int) -> Claim:
+def claim_of(view: View, entered: Entered) -> Claim:
     """Returns the claim of a ramp vehicle that has just entered.
 
     Its crossing is that of free movement, less the time for which it was held up outside.
     """
-    held_up_s = sum(e.time_s - e.since_s for e in view.entered if e.row == row)
-    crossing_s = crossings_s(view.fleet, row, view.time_s, view.packed_rules) - held_up_s
+    row, held_up_s = entered.row, entered.time_s - entered.since_s
+    crossing_s = crossing_of_s(view.fleet, row, view.time_s, view.packed_rules) - held_up_s
     return Claim(
         row,
+        entered.time_s,
         crossing_s,
         float(view.fleet.length_m[row]),
         crossing_s < view.time_s + time_ahead_s(view) - 0.5 * view.rules.control.step_s,
