@@ -132,8 +132,8 @@ def test_merge_with_a_gap_maker_is_accepted_with_its_least_margin():
 
 
 def test_every_reason_has_its_words():
-    assert len(REASONS) == 15
-    assert len(set(REASONS)) == 15
+    assert len(REASONS) == 16
+    assert len(set(REASONS)) == 16
 
 
 # form ---------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ MODULES = [
     "coramp.strategies.base",
     "coramp.coordination.plant",
 ]
-UNITS = re.compile(r"_(m|s|mps|mps2|m2ps4|mlps|l|kg|rad|deg|veh_h)$")
+UNITS = re.compile(r"_(m|s|mps|mps2|mps3|m2ps4|mlps|l|kg|rad|deg|veh_h)$")
 DIMENSIONLESS = {
     "adhesion",
     "resistance",
@@ -24,6 +24,7 @@ DIMENSIONLESS = {
     "log10_mass_ratio",
     "speed_deviation",
     "slow_deviation",
+    "slowest_share",
     "mainline_occupancy",
     "queue_occupancy",
 }

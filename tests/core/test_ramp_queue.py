@@ -151,8 +151,11 @@ def test_vehicle_of_a_queue_behind_one_that_stands_for_ever_stays():
 
 
 def test_nobody_waits_where_the_distances_of_eq_1_are_all():
-    assert longest_wait_s(RULES.safety) == 0.0
-    assert longest_wait_s(RULES.safety._replace(time_gap_s=0.6)) == close(19.2)  # 32 vehicles
+    assert longest_wait_s(RULES) == 0.0
+    with_gap = RULES._replace(safety=RULES.safety._replace(time_gap_s=0.6))
+    assert longest_wait_s(with_gap) == close(19.2)  # 32 vehicles
+    still = RULES._replace(safety=RULES.safety._replace(standstill_gap_m=2.5))
+    assert longest_wait_s(still) == close(32 * 2.5 / RULES.road.mainline_speed_mps)
 
 
 def test_place_ahead_drives_on_as_committed_and_leaves_out_the_old_stop():

@@ -21,8 +21,8 @@ LENGTH_M = 5.0
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("story") / "r"
-    flows = {"mainline_veh_h": 2600, "ramp_veh_h": 1000, "seed": 3, "horizon_s": 100}
-    gap = {"safety.time_gap_s": 0.8}
+    flows = {"mainline_veh_h": 2000, "ramp_veh_h": 1000, "seed": 3, "horizon_s": 200}
+    gap = {"safety.time_gap_s": 0.9}
     coramp.run("paper", engine="exact", overrides=gap, out=out, **flows)
     return out
 

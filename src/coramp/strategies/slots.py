@@ -21,16 +21,16 @@ from coramp.strategies.base import (
 from coramp.strategies.ladder import explanation, held
 from coramp.strategies.parameters import choice, parameter
 from coramp.strategies.situation import RUNG_HOLD
-from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, plan_in_lane
+from coramp.strategies.slot_in_lane import Manner, plan_in_lane
 from coramp.strategies.slot_onto_lane import crossing_of_s, plan_onto_lane
 
 ON_TIME_S = 1e-6
 SHARED = ("first-come", "least-delay")
 QUEUE_S = 5.0
 """Up to such a wait the lane is not beyond its limit: who could cross next has the slot."""
-SLOWEST_ENTRY_SHARE = SLOWEST_SHARE + 0.1
-"""Of v0: below it a mainline vehicle waits outside. What is lost inside is lost at higher speeds,
-and the entrance carries less the slower it is passed."""
+SLOWEST_ENTRY_SHARE = 0.4
+"""Of v0: below it a mainline vehicle waits outside. Higher shares lose capacity: who enters late
+cannot make up for it."""
 
 
 @dataclass(frozen=True)

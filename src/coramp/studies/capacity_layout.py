@@ -8,6 +8,7 @@ import polars as pl
 
 from coramp.studies.breakdown import BREAKDOWN_DELAY_S, broke_down
 from coramp.studies.lane_breakdown import Key, lane_flows_veh_h
+from coramp.studies.overrides import overrides_of
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 
@@ -50,17 +51,17 @@ class Breakdown:
     def name(self) -> str:
         """The combination in words."""
         gap = gaps_in_words(self.overrides or "")
-        who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
-        if self.drivers:
-            return who
-        return f"{who}, {gap or 'Eq. 1'}"
+        if self.drivers is None:
+            return f"{self.strategy}, {gap or 'Eq. 1'}"
+        own = gap.replace(f"drivers.{self.drivers}.", "")
+        return f"{self.strategy} ({self.drivers}){', ' + own if own else ''}"
 
 
 def gaps_in_words(overrides: str) -> str:
     """Returns overrides in words; gaps by their values alone."""
     words = []
-    for override in overrides.split():
-        key, _, value = override.partition("=")
+    for key, value in overrides_of({"overrides": overrides}).items():
+        override = f"{key}={value}"
         words.append(f"{value} {UNITS[key]}" if key in UNITS else override)
     return ", ".join(sorted(words, key=lambda word: word.endswith(" m")))
 

@@ -5,7 +5,6 @@ On the same arrivals as a study's searches, by bisection between the same flows,
 
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -22,6 +21,7 @@ from coramp.metrics.delay_bound import (
 )
 from coramp.scenario import Scenario
 from coramp.studies.breakdown import BREAKDOWN_DELAY_S
+from coramp.studies.overrides import overrides_of
 
 Key = tuple[str, str, float, int]
 """Scenario, overrides, ramp flow (veh/h) and seed."""
@@ -65,7 +65,11 @@ def least_delay_s(
     mainline_veh_h: float,
 ) -> float:
     """Returns the mean delay (s) of all that no plan can beat, from the arrivals alone."""
-    settings = _settings(overrides)
+    settings = {
+        key: value
+        for key, value in overrides_of({"overrides": overrides}).items()
+        if not key.startswith("strategy.")  # of no effect on who arrives, nor on the lane
+    }
     settings["mainline.flow_veh_h"], settings["ramp.flow_veh_h"] = mainline_veh_h, ramp_veh_h
     if horizon_s is not None:
         settings["simulation.horizon_s"] = horizon_s
@@ -88,15 +92,3 @@ def mean_bound_s(scenario: Scenario, seed: int) -> float:
     earliest_s = earliest_exits_s(*arrived[:3], packed(rules))
     headway_s = lane_headway_s(min(a.length_m for a in arrivals), rules)
     return mean_delays(arrived, first_come_exits_s(earliest_s, headway_s)).all_s
-
-
-def _settings(overrides: str) -> dict[str, Any]:
-    """Settings as a row tells them; those that are no numbers belong to strategies."""
-    found: dict[str, Any] = {}
-    for part in overrides.split():
-        key, _, text = part.partition("=")
-        try:
-            found[key] = float(text)
-        except ValueError:
-            continue
-    return found
