@@ -24,6 +24,7 @@ FIGURES = {
 
 def run(strategy, drivers, overrides, delay_s, mainline=1200.0, **figures):
     return {
+        "scenario": "paper",
         "strategy": strategy,
         "drivers": drivers,
         "overrides": overrides,
@@ -51,6 +52,13 @@ def test_everyone_is_named_by_who_and_which_gaps():
         "fair drivers, tau_s=1.4",
         "fair drivers",
     ]
+
+
+def test_a_scenario_s_own_gaps_are_named_too():
+    own = {**run("slots", None, None, 1.0), "scenario": "motorway"}
+    assert name_of(own) == "slots, 1.0 s, 2.5 m"
+    longer = {**run("slots", None, "safety.time_gap_s=1.4", 1.0), "scenario": "motorway"}
+    assert name_of(longer) == "slots, 1.4 s, 2.5 m"
 
 
 def test_delays_stand_by_flow_and_the_rest_once_a_flow():

@@ -9,6 +9,9 @@ from matplotlib.figure import Figure
 from coramp.report.style import GREY, LINES, Look, grid, look_of, new_figure, save_figure
 from coramp.studies.capacity_layout import Breakdown, breakdowns
 
+LINE_INCHES = 0.26
+"""Of the legend, for each line."""
+
 
 def save_capacity_figure(runs: pl.DataFrame, path: Path) -> None:
     """Writes the figure of a capacity study; the file's ending says how."""
@@ -19,11 +22,15 @@ def capacity_figure(runs: pl.DataFrame) -> Figure:
     """Returns one line a combination: where it breaks down, with intervals over seeds.
 
     Colours and markers are those of the strategies, lines tell time gaps apart. Points at the
-    upper edge, with an arrow, did not break down within the range. Dotted: what the lane carries,
+    upper edge, with an arrow, did not break down within the range; combinations that never did are
+    left out where others did. Dotted: what the lane carries,
     less the ramp flow, where that lies within the range.
     """
-    found = breakdowns(runs.filter(status="ok"))
-    figure = new_figure(8.6, 4.8)
+    every = breakdowns(runs.filter(status="ok"))
+    within = {b.name for b in every if b.flows or b.below}
+    found = [b for b in every if b.name in within] or every
+    lines = len({b.name for b in found})
+    figure = new_figure(8.6, max(4.8, LINE_INCHES * lines))
     axes = figure.subplots()
     gaps = list(dict.fromkeys(b.overrides for b in found))
     for name in dict.fromkeys(b.name for b in found):

@@ -73,6 +73,7 @@ COOPERATIVE = {
     "game": Look("game", ORANGE, "D", "--"),
     "virtual-platoon": Look("virtual platoon", BLACK, "s", "-."),
     "ocbf": Look("OCBF", GREY, "*", "--"),
+    "slots": Look("slots", VERMILION, "o", "-"),
 }
 METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
 

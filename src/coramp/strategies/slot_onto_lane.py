@@ -50,6 +50,11 @@ NOSES = ((0.0, 0.0), (0.0, 0.1), (0.0, 0.25), (0.0, 0.5), (0.0, 1.0), (1.0, 0.0)
 """How the nose is passed: how far from the ramp's speed to its limit and, behind it, how far from
 free movement's acceleration to the largest."""
 LONGEST_WAIT_S = 1e4
+MOST_TRIES_PUSHING = 3
+"""Ways of the subject that are tried where others fall back: each try has them all planned."""
+PATIENCE_S = 5.0
+"""Where others may fall back, a slot this much later is not taken yet: those behind it on the ramp
+would have to come later still."""
 
 
 class Wish(NamedTuple):
@@ -102,7 +107,8 @@ def plan_onto_lane(
     The slots tried lie in the gaps of the lane order, from its earliest backwards: that of free
     movement or, for a vehicle that was held up, one nearer to the crossing time ``claim_s`` that it
     would have had. With ``pushes`` the first one tried is behind all that cross before the claim,
-    and those behind it on the mainline fall back. The rest is what ``ramp_neighbours`` tells.
+    and those behind it on the mainline fall back; a much later one is not taken. The rest is what
+    ``ramp_neighbours`` tells.
     """
     rules = unpacked(packed_rules)
     proposal = empty_proposal(ROOM)
@@ -118,6 +124,9 @@ def plan_onto_lane(
             merge = slot_among(fleet, proposal, situation, wish, rules)
         if merge.gap < 0:
             merge = first_slot(fleet, proposal, situation, wish, rules)
+            if pushes and merge.largest_shift_m > rules.road.mainline_speed_mps * PATIENCE_S:
+                proposal.size[0] = 0
+                merge = no_merge()
     rung = RUNG_HOLD
     if merge.gap >= 0:
         rung = RUNG_DELAY
@@ -200,7 +209,7 @@ def slot_among(
     """Proposes the slot behind all that cross before the claim; who is behind it falls back."""
     order, intercepts_m = situation.order, situation.intercepts_m
     gap = 0
-    while gap < len(order) and intercepts_m[gap] >= wish.claim_m:
+    while gap < len(order) and intercepts_m[gap] >= min(wish.claim_m, wish.earliest_m):
         gap += 1
     first_m = wish.earliest_m
     if gap > 0:
@@ -232,8 +241,10 @@ def merge_in_slot(
         fleet, proposal, situation, situation.approach, free, place, rules
     ):
         return merge_of(proposal, place.gap, free, max(0.0, behind_free_m))
-    regained_s = leader_regains_s(fleet, situation, rules)
+    regained_s, tried = leader_regains_s(fleet, situation, rules), 0
     for faster, share in NOSES:
+        if place.first_behind < len(situation.order) and tried >= MOST_TRIES_PUSHING:
+            return no_merge()
         accel_mps2 = free + share * (most - free)
         nose_mps = road.ramp_speed_mps + faster * (road.ramp_limit_mps - road.ramp_speed_mps)
         lag = lag_m(road.mainline_speed_mps, nose_mps, accel_mps2)
@@ -252,6 +263,7 @@ def merge_in_slot(
         ):
             if not situation.from_s < end_s <= nose_s:
                 continue
+            tried += 1
             n = slow_on_ramp(fleet, situation, nose_s, nose_mps, end_s, way, rules)
             if n > 0 and merges_safely(
                 fleet, proposal, situation, way[:n], accel_mps2, place, rules

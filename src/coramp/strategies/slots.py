@@ -28,6 +28,8 @@ ON_TIME_S = 1e-6
 SHARED = ("first-come", "least-delay")
 QUEUE_S = 5.0
 """Up to such a wait the lane is not beyond its limit: who could cross next has the slot."""
+LONGEST_PUSH_S = 60.0
+"""So long after its entry a ramp vehicle may have others fall back; then it takes any slot."""
 SLOWEST_ENTRY_SHARE = 0.4
 """Of v0: below it a mainline vehicle waits outside. Higher shares lose capacity: who enters late
 cannot make up for it."""
@@ -123,7 +125,7 @@ class Slots:
             row,
             view.time_s,
             claim.crossing_s,
-            claim.late_known and self.order != "mainline-first",
+            self._pushes(view, claim),
             self._most_jerk,
             view.packed_rules,
         )
@@ -160,6 +162,16 @@ class Slots:
         if self.order == "mainline-first":
             return math.inf if view.time_s <= claim.entered_s else view.time_s
         return claim.crossing_s - time_ahead_s(view)
+
+    def _pushes(self, view: View, claim: Claim) -> bool:
+        """Whether mainline vehicles that cross after it fall back behind a ramp vehicle.
+
+        Not once it is so late that there may never be room among them.
+        """
+        late_s = view.time_s + time_ahead_s(view) - claim.crossing_s
+        known_late_s = claim.entered_s + time_ahead_s(view) - claim.crossing_s
+        patient = late_s - known_late_s <= LONGEST_PUSH_S
+        return claim.late_known and patient and self.order != "mainline-first"
 
     def _goes_now(self, view: View, claim: Claim) -> bool:
         """Whether a ramp vehicle gets its slot before the mainline vehicle that waits outside."""

@@ -61,6 +61,8 @@ def gaps_in_words(overrides: str) -> str:
     """Returns overrides in words; gaps by their values alone."""
     words = []
     for key, value in overrides_of({"overrides": overrides}).items():
+        if key in UNITS and not value:
+            continue
         override = f"{key}={value}"
         words.append(f"{value} {UNITS[key]}" if key in UNITS else override)
     return ", ".join(sorted(words, key=lambda word: word.endswith(" m")))

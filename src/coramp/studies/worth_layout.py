@@ -5,9 +5,11 @@ from typing import Any
 import polars as pl
 
 from coramp.studies.capacity_layout import gaps_in_words
+from coramp.studies.overrides import setting_of
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import Table, number, with_interval
 
+GAPS = ("safety.time_gap_s", "safety.standstill_gap_m")
 DELAYS_NOTE = (
     "Mean delay of all vehicles in s, waiting outside included, with 95 % intervals over seeds. In "
     "brackets how many were not out at the end (u) and how many pairs collided in SUMO (c)."
@@ -61,7 +63,9 @@ def name_of(run: dict[str, Any]) -> str:
     """Returns who drove and at which gaps, in words."""
     gaps = gaps_in_words(run["overrides"] or "")
     if run["drivers"] is None:
-        return f"{run['strategy']}, {gaps or 'Eq. 1'}"
+        kept = gaps_in_words(" ".join(f"{key}={setting_of(run, key)}" for key in GAPS))
+        others = [part for part in gaps.split(", ") if part and part not in kept]
+        return ", ".join([run["strategy"], kept or "Eq. 1", *others])
     own = gaps.replace(f"drivers.{run['drivers']}.", "")
     return f"{run['drivers']} drivers{', ' + own if own else ''}"
 
