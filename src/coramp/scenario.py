@@ -7,7 +7,15 @@ work together. ``--set key=value`` takes the same dotted keys.
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from coramp.core.conflict_risk import GRAVITY_MPS2
 from coramp.core.ramp_acceleration import lag_m
@@ -211,6 +219,18 @@ class Scenario(Model):
     simulation: Simulation = Simulation()
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = {}
+
+    @field_validator("strategy", mode="before")
+    @classmethod
+    def _finite_parameters(cls, strategies: Any) -> Any:
+        """Tells in one line what the kinds of values would each tell in a line of their own."""
+        for name, settings in strategies.items() if isinstance(strategies, dict) else ():
+            for key, value in settings.items() if isinstance(settings, dict) else ():
+                if isinstance(value, float) and not math.isfinite(value):
+                    raise ValueError(
+                        f"strategy.{name}.{key}: {value} cannot be; allowed are finite numbers"
+                    )
+        return strategies
 
     @model_validator(mode="after")
     def _works_together(self) -> Self:

@@ -197,6 +197,16 @@ def test_a_share_without_an_order_that_it_is_for_is_refused():
         paper(1.0, strategy__slots__order="last")
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_parameter_that_is_not_finite_is_refused_in_one_line(value):
+    with pytest.raises(CorampError) as refused:
+        paper(1.0, strategy__slots__ramp_share=value)
+    (line,) = refused.value.messages
+    assert line.endswith(
+        f"strategy.slots.ramp_share: {value} cannot be; allowed are finite numbers"
+    )
+
+
 class Undeclared(Slots):
     """Slots that do not say that they may hold up newcomers."""
 
