@@ -16,9 +16,9 @@ def test_packing_and_unpacking_gives_the_same_rules():
 
 
 def test_every_number_has_a_place_of_its_own():
-    numbers = np.arange(31.0)
+    numbers = np.arange(32.0)
     rules = unpacked(numbers)
     assert isinstance(rules, Rules)
-    assert [float(value) for part in rules for value in part][:29] == numbers[:29].tolist()
+    assert [float(value) for part in rules for value in part][:30] == numbers[:30].tolist()
     assert (rules.control.gap_at_front, rules.control.create_from_nose) == (True, True)
-    assert len(packed(RULES)) == 31
+    assert len(packed(RULES)) == 32

@@ -23,6 +23,9 @@ from coramp.run_folder import StoredRun
 
 STEP_S = 0.1
 
+RAMP_NAMES = "r"
+"""How names of ramp vehicles begin."""
+
 
 def save_story_figure(run: StoredRun, vehicle_id: str, path: Path) -> None:
     """Writes the figure of a vehicle of a run; the file's ending says how (png, svg, pdf).
@@ -62,7 +65,8 @@ def _title(scene: Scene) -> str:
     if not scene.merges:
         where = "no merge is safe yet"
     whose = f"{scene.subject}, decision at {decision['time_s']:.1f} s, rung {decision['rung']}"
-    does = "moves" if decision["rung"] == "create" else "brakes"
+    on_ramp = scene.asked.startswith(RAMP_NAMES)
+    does = "brakes" if on_ramp and decision["rung"] != "create" else "moves"
     whom = "" if scene.asked == scene.subject else f"{scene.asked} {does} for "
     return f"{whom}{whose}: {where}"
 

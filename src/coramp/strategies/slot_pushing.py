@@ -23,9 +23,9 @@ from coramp.core.trajectory import SPEED
 from coramp.strategies.situation import Situation
 from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, slow_cruise
 
-SETBACKS_M = (0.0, 1.0, 4.0)
+SETBACKS_M = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)
 """How far behind its place a vehicle that falls back is tried."""
-END_SHARES = (1.0, 0.6, 0.3)
+END_SHARES = (1.0, 0.8, 0.6, 0.45, 0.3, 0.15)
 AT_ONCE = Manner(False, 0.0)
 
 
