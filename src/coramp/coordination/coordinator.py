@@ -31,7 +31,7 @@ from coramp.coordination.gate import (
     waiting_at,
 )
 from coramp.coordination.ledger import Ledger
-from coramp.coordination.newcomers import in_the_way
+from coramp.coordination.newcomers import Newcomers
 from coramp.coordination.plant import Arrival, Plant
 from coramp.coordination.supervisor import drive_safely
 from coramp.core.approach import stop_starts_s
@@ -107,6 +107,7 @@ class Coordinator:
         slowest_mps = policy.slowest_share * road.mainline_speed_mps
         self._gate = gate_for(arrivals, policy.asked, slowest_mps)
         self._fastest_entry_mps = fastest_entry_mps
+        self._newcomers = Newcomers(fastest_entry_mps, rules)
         self._plant = plant
         self._memory: Memory = None
         self._step_s = rules.control.step_s
@@ -332,9 +333,7 @@ class Coordinator:
             if (
                 code == ACCEPTED
                 and not self._holds_newcomers
-                and in_the_way(
-                    self.ledger, trajectories, time_s, self._fastest_entry_mps, self._rules
-                )
+                and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
             ):
                 code = HOLDS_NEWCOMERS
             if code != ACCEPTED:

@@ -13,26 +13,29 @@ from coramp.strategies.situation import foremost_unknown_m
 ROUNDING_M = 1e-6
 
 
-def in_the_way(
-    ledger: Ledger,
-    commands: Sequence[FollowTrajectory],
-    time_s: float,
-    fastest_entry_mps: float,
-    rules: Rules,
-) -> bool:
-    """Returns whether a new merge may bother a vehicle that has not entered by ``time_s``.
+class Newcomers:
+    """The places that mainline vehicles can have which have not entered yet."""
 
-    The merge must leave a length and the clearance to the foremost place that such a vehicle can
-    have, on the way that it would drive with nobody before it.
-    """
-    v0 = rules.road.mainline_speed_mps
-    foremost_m = foremost_unknown_m(time_s, fastest_entry_mps, rules)
-    clearance_m = merge_clearance_m(rules.road, rules.safety)
-    for command in commands:
-        if command.merge_time_s == math.inf or ledger.merge_time_s(command.row) < math.inf:
-            continue
-        station_m, _ = station_and_speed(command.pieces, command.merge_time_s)
-        rear_m = station_m - v0 * command.merge_time_s - ledger.length_m(command.row)
-        if rear_m - clearance_m < foremost_m - ROUNDING_M:
-            return True
-    return False
+    def __init__(self, fastest_entry_mps: float, rules: Rules) -> None:
+        self._v0_mps = rules.road.mainline_speed_mps
+        self._foremost_at_0_m = foremost_unknown_m(0.0, fastest_entry_mps, rules)
+        self._clearance_m = merge_clearance_m(rules.road, rules.safety)
+
+    def are_held_up(
+        self, ledger: Ledger, commands: Sequence[FollowTrajectory], time_s: float
+    ) -> bool:
+        """Returns whether a new merge may bother a vehicle that has not entered by ``time_s``.
+
+        The merge must leave a length and the clearance to the foremost place that such a vehicle
+        can have, on the way that it would drive with nobody before it.
+        """
+        for command in commands:
+            merge_s = command.merge_time_s
+            if merge_s == math.inf or ledger.merge_time_s(command.row) < math.inf:
+                continue
+            station_m, _ = station_and_speed(command.pieces, merge_s)
+            rear_m = station_m - self._v0_mps * merge_s - ledger.length_m(command.row)
+            foremost_m = self._foremost_at_0_m - self._v0_mps * time_s
+            if rear_m - self._clearance_m < foremost_m - ROUNDING_M:
+                return True
+        return False
