@@ -33,7 +33,10 @@ class Newcomers:
             merge_s = command.merge_time_s
             if merge_s == math.inf or ledger.merge_time_s(command.row) < math.inf:
                 continue
-            station_m, _ = station_and_speed(command.pieces, merge_s)
+            last_s, last_m = command.pieces[-1, :2].tolist()
+            station_m = last_m  # plans merge where their last piece begins
+            if last_s != merge_s:
+                station_m, _ = station_and_speed(command.pieces, merge_s)
             rear_m = station_m - self._v0_mps * merge_s - ledger.length_m(command.row)
             foremost_m = self._foremost_at_0_m - self._v0_mps * time_s
             if rear_m - self._clearance_m < foremost_m - ROUNDING_M:
