@@ -2,7 +2,7 @@
 
 The lane behind the merge is a queue with one server: vehicles follow one another at a fixed time h.
 Each vehicle of either stream gets the first free slot after its own earliest time, in the order of
-these times, and is never planned again.
+these times. It is planned again only where a ramp vehicle that is known late goes before it.
 """
 
 import math
