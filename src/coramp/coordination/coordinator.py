@@ -19,6 +19,7 @@ from coramp.coordination.admission import (
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
     DONE,
+    FULL,
     NEVER,
     REFUSED,
     WAITS,
@@ -140,15 +141,16 @@ class Coordinator:
     def _admit(self, last_step: int) -> None:
         """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
         while True:
-            self.ledger.make_room()
             stop = admit_until(
                 self.ledger.book, self._gate, last_step, self._packed, self._examiner.bounds
             )
             last_step = min(last_step, self._announce_entries())
-            if stop.why == REFUSED:
-                self._note_refusal(stop.step, len(self.ledger), stop.code)
-            elif stop.why == DONE:
+            if stop.why == DONE:
                 return
+            if stop.why == FULL:
+                self.ledger.make_room()
+            elif stop.why == REFUSED:
+                self._note_refusal(stop.step, len(self.ledger), stop.code)
 
     def _announce_entries(self) -> int:
         """Tells who has entered; returns the first step at which one of them is planned."""
@@ -257,6 +259,8 @@ class Coordinator:
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self.ledger.commit(row, pieces, merge_time_s)
+        if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
+            self._due_step.pop(row, None)
         self._announce(row, step)
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coramp._kernel import FloatArray, kernel
+from coramp._kernel import kernel
 from coramp.audit.checker import Change, Verdict, examine
 from coramp.audit.distances import Bounds
-from coramp.coordination.book import Book
+from coramp.coordination.book import Book, fleet_of
 from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
-from coramp.core.fleet import MAX_CHANGED
+from coramp.core.fleet import MAX_CHANGED, committed
 from coramp.core.rules import Rules
-from coramp.core.trajectory import MAX_PIECES, station_and_speed
+from coramp.core.trajectory import MAX_PIECES, TIME, station_and_speed
 from coramp.strategies.base import FollowTrajectory
 
 
@@ -46,47 +46,51 @@ class Examiner:
         self._make_room(MAX_CHANGED)
 
     def _make_room(self, changes: int) -> None:
-        self._rows = np.zeros(changes, np.int64)
-        self._count = np.zeros(changes, np.int64)
-        self._pieces = np.zeros((changes, MAX_PIECES, 4))
-        self._merge_s = np.zeros(changes)
-        self._start = np.zeros((changes, 3))
-        self._makes_gap = np.zeros(changes, np.int64)
+        self._change = Change(
+            np.zeros(changes, np.int64),
+            np.zeros(changes, np.int64),
+            np.zeros((changes, MAX_PIECES, 4)),
+            np.zeros(changes),
+            np.zeros((changes, 3)),
+            np.zeros(changes, np.int64),
+        )
 
     def change(
         self, ledger: Ledger, commands: Sequence[FollowTrajectory], earliest_s: float
     ) -> Verdict:
         """Returns the verdict on trajectories that take over from what is committed."""
-        if len(commands) > len(self._rows):
+        if len(commands) > len(self._change.rows):
             self._make_room(2 * len(commands))
+        change = self._change
         for k, command in enumerate(commands):
-            start_s = command.pieces[0, 0]
-            station_m, speed_mps = station_and_speed(ledger.trajectory(command.row), start_s)
-            self._lay(k, command, np.array([start_s, station_m, speed_mps]))
-        return self._examine(ledger.book, len(commands), earliest_s)
-
-    def _lay(self, k: int, command: FollowTrajectory, start: FloatArray) -> None:
-        count = len(command.pieces)
-        self._rows[k] = command.row
-        self._count[k] = count
-        self._pieces[k, :count] = command.pieces
-        self._merge_s[k] = command.merge_time_s
-        self._start[k] = start
-        self._makes_gap[k] = command.makes_gap
-
-    def _examine(self, book: Book, k: int, earliest_s: float) -> Verdict:
-        change = Change(
-            self._rows[:k],
-            self._count[:k],
-            self._pieces[:k],
-            self._merge_s[:k],
-            self._start[:k],
-            self._makes_gap[:k],
-        )
-        return examine_change(book, change, earliest_s, self.bounds)
+            count = len(command.pieces)
+            change.rows[k] = command.row
+            change.piece_count[k] = count
+            change.pieces[k, :count] = command.pieces
+            change.merge_s[k] = command.merge_time_s
+            change.makes_gap[k] = command.makes_gap
+        return examine_change(ledger.book, change, len(commands), earliest_s, self.bounds)
 
 
 @kernel
-def examine_change(book: Book, change: Change, earliest_s: float, bounds: Bounds) -> Verdict:
-    """Returns the checker's verdict on a change of what stands in the book."""
-    return examine(vehicles_of(book), change, earliest_s, bounds)
+def examine_change(
+    book: Book, change: Change, count: int, earliest_s: float, bounds: Bounds
+) -> Verdict:
+    """Returns the checker's verdict on the first ``count`` entries of a change of the book.
+
+    Fills in where each must take over: what is committed for its first time.
+    """
+    fleet = fleet_of(book)
+    for k in range(count):
+        start_s = change.pieces[k, 0, TIME]
+        station_m, speed_mps = station_and_speed(committed(fleet, change.rows[k]), start_s)
+        change.start[k, 0], change.start[k, 1], change.start[k, 2] = start_s, station_m, speed_mps
+    in_use = Change(
+        change.rows[:count],
+        change.piece_count[:count],
+        change.pieces[:count],
+        change.merge_s[:count],
+        change.start[:count],
+        change.makes_gap[:count],
+    )
+    return examine(vehicles_of(book), in_use, earliest_s, bounds)

@@ -85,11 +85,12 @@ def gate_for(arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float
 
 def entries_of(gate: Gate, rows: range, step_s: float) -> tuple[Entered, ...]:
     """Returns the entries of these rows of the book."""
-    arrivals = gate.row_arrival[rows.start : rows.stop]
-    return tuple(
-        Entered(row, bool(gate.on_ramp[k]), int(gate.row_step[row]) * step_s, gate.step[k] * step_s)
-        for row, k in zip(rows, arrivals.tolist(), strict=True)
-    )
+    entries = []
+    for row in rows:
+        k = gate.row_arrival[row]
+        entered_s, since_s = float(gate.row_step[row] * step_s), float(gate.step[k] * step_s)
+        entries.append(Entered(row, bool(gate.on_ramp[k]), entered_s, since_s))
+    return tuple(entries)
 
 
 def waiting_at(gate: Gate, step: int, step_s: float) -> Waiting:

@@ -44,8 +44,7 @@ class Detectors:
     passed_veh: int
 
 
-@dataclass(frozen=True, slots=True)
-class Entered:
+class Entered(NamedTuple):
     """A vehicle that has entered: its row, its stream, when, and since when it wanted to (s)."""
 
     row: int
@@ -109,7 +108,7 @@ class View:
         """The last reports of all live vehicles."""
         return self.ask_reports()
 
-    @cached_property
+    @property
     def entered(self) -> tuple[Entered, ...]:
         """Who has entered since the strategy was last asked, in order of entry."""
         return self.ask_entered()

@@ -97,7 +97,7 @@ class Slots:
             decision = self._onto_lane(view, row, claims)
         else:
             decision = Decision((), (), claims)
-        return replace(decision, wakes_s=(*rest, *decision.wakes_s))
+        return replace(decision, wakes_s=(*rest, *decision.wakes_s)) if rest else decision
 
     def _in_lane(self, view: View, row: int, claims: tuple[Claim, ...]) -> Decision:
         """The slot of a mainline vehicle; then the first ramp vehicle that waits is asked about."""
