@@ -6,9 +6,9 @@ import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from coramp.engines.sumo import engine
-from coramp.engines.sumo.network import sumo_binary
-from coramp.engines.sumo.session import Session
+from coramp.worlds.sumo import engine
+from coramp.worlds.sumo.network import sumo_binary
+from coramp.worlds.sumo.session import Session
 
 
 @dataclass

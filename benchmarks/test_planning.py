@@ -1,15 +1,15 @@
-"""Time of a decision in the exact engine: planning, audit, commitment and record."""
+"""Time of a decision in the exact engine: planning, examination, commitment and record."""
 
 import time
 
 import numpy as np
 import pytest
 
-from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
-from coramp.engines.outcomes import cap_step_of
-from coramp.loading import load_scenario
+from coramp.demand.arrivals import arrivals_of
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
+from coramp.worlds.outcomes import cap_step_of
 
 P99_AT_MOST_MS = 1.0
 MEDIAN_RATIO_AT_MOST = 2.0

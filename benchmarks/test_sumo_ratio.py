@@ -1,7 +1,7 @@
 """Cooperative runs, in SUMO and in the exact engine, against plain sumo on the same demand.
 
 Side by side in every round, as ratios. In SUMO both are simulation time, from the start of the
-simulation to its end; planning, audit and commands are part of ours. The exact engine's time is
+simulation to its end; planning, checking and commands are part of ours. The exact engine's time is
 that of a whole run, arrivals and all metrics included.
 """
 
@@ -11,10 +11,10 @@ import time
 import pytest
 
 from benchmarks.simulation import plain_sumo_s, simulation_clock
-from coramp.engines.sumo.engine import SumoOptions, run_cooperative
-from coramp.loading import load_scenario
-from coramp.running import execute, make_spec
+from coramp.runs.running import execute, make_spec
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
+from coramp.worlds.sumo.engine import SumoOptions, run_cooperative
 
 ROUNDS = 9
 SUMO_AT_MOST = 1.15

@@ -9,7 +9,7 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import MAINLINE, driven_pieces
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
 
 STEP_S = 0.1

@@ -8,17 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from coramp.demand import demand_above_limit, demands_above_limit
-from coramp.engines.sumo.engine import SumoOptions
 from coramp.errors import CorampError
-from coramp.explanation import Quantity, quantities
-from coramp.files import made_folder, staged_folder
-from coramp.metrics.tables import Row
-from coramp.planning import PlannedSnapshot, plan_snapshot
-from coramp.plots import PlanPlots, RunPlots, StudyPlots
-from coramp.run_folder import MARK, StoredRun, run_content, write_run
-from coramp.running import RunSpec, broken_promises, engine_checked, execute, make_spec
-from coramp.snapshots import load_snapshot
+from coramp.explain.decision import Quantity, quantities
+from coramp.records.files import made_folder, staged_folder
+from coramp.records.run_folder import MARK, StoredRun, write_run
+from coramp.records.schemas import Row
+from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
+from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
+from coramp.runs.planning import PlannedSnapshot, plan_snapshot
+from coramp.runs.running import (
+    RunSpec,
+    broken_promises,
+    engine_checked,
+    execute,
+    make_spec,
+    run_content,
+)
+from coramp.scenarios.snapshots import load_snapshot
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
 from coramp.studies.cluster import connected
@@ -29,6 +35,7 @@ from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
 from coramp.studies.tables import Table
+from coramp.worlds.sumo.engine import SumoOptions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,7 +218,7 @@ def run(
         return _executed(spec, SumoOptions(gui=gui))
     with staged_folder(Path(out), MARK) as stage:
         result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
-        write_run(stage, spec, result.frames, result.summary)
+        write_run(stage, result.content, result.frames)
     return result
 
 

@@ -13,15 +13,14 @@ from gymnasium import spaces
 
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp._registration import register
-from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.guard import LONGEST_PERIOD_S, strategy_to_run
-from coramp.core.fleet import Fleet
-from coramp.core.ramp_acceleration import lag_m
-from coramp.core.rules import Rules, packed, unpacked
-from coramp.core.trajectory import station_and_speed
+from coramp.demand.arrivals import arrivals_of
+from coramp.equations.ramp_acceleration import lag_m
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.rules import Rules, packed, unpacked
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -33,6 +32,7 @@ from coramp.strategies.base import (
 )
 from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
 from coramp.strategies.registry import strategy_named
+from coramp.vehicles.fleet import Fleet
 
 NEIGHBOURS = 2
 """So many vehicles before the agent in the order of merging are seen, and so many behind it."""

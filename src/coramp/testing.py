@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from coramp.arrivals import arrivals_of
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.guard import Guarded
-from coramp.loading import load_scenario
-from coramp.scenario import Scenario
+from coramp.demand.arrivals import arrivals_of
+from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.model import Scenario
 from coramp.strategies.base import (
     Decision,
     FollowTrajectory,

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from coramp.coordination.admission import safe_to_enter
-from tests.core import RULES, fleet_of, pieces
+from tests.mathematics import RULES, fleet_of, pieces
 
 BUMPER_M = 5.0
 CRUISE = 0.04 + 2 * 3e-9 * 16.0 + 0.1

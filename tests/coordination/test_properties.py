@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coramp.arrivals import arrivals_of
 from coramp.coordination.plant import Arrival
-from coramp.loading import load_scenario
+from coramp.demand.arrivals import arrivals_of
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import Decision, FollowTrajectory
 from coramp.strategies.situation import assess
 from tests.situations import (

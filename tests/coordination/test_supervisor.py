@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import RAMP
 from coramp.coordination.plant import Arrival
-from coramp.core.trajectory import station_and_speed
-from coramp.loading import load_scenario
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import Decision, DriveWithAcceleration
 from tests.situations import driven, least_margin_m, loop, named, situations
 

@@ -2,13 +2,12 @@
 
 import importlib
 import inspect
-import pkgutil
 import re
 from pathlib import Path
 
 import pytest
 
-import coramp.core
+from tests.mathematics import mathematics
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "equations.md"
 EQUATIONS = 48
@@ -47,16 +46,15 @@ def function_of(path):
     return getattr(value, "py_func", value)
 
 
-def core_docstrings():
-    """Returns every docstring of the core by the name of what it belongs to."""
+def docstrings():
+    """Returns every docstring of the mathematics by the name of what it belongs to."""
     found = {}
-    for info in pkgutil.iter_modules(coramp.core.__path__):
-        module = importlib.import_module(f"coramp.core.{info.name}")
-        found[info.name] = module.__doc__ or ""
+    for module_name, module in mathematics().items():
+        found[module_name] = module.__doc__ or ""
         for name, value in vars(module).items():
             plain = getattr(value, "py_func", value)
             if getattr(plain, "__module__", None) == module.__name__ and plain.__doc__:
-                found[f"{info.name}.{name}"] = plain.__doc__
+                found[f"{module_name}.{name}"] = plain.__doc__
     return found
 
 
@@ -87,13 +85,13 @@ def test_a_link_leads_to_the_page_of_its_module(number, shown, page, path):
     assert f"::: {path.rsplit('.', 1)[0]}\n" in text
 
 
-@pytest.mark.parametrize("name", sorted(core_docstrings()))
+@pytest.mark.parametrize("name", sorted(docstrings()))
 def test_every_equation_that_the_core_cites_stands_there(name):
-    assert numbers(core_docstrings()[name]) <= ROWS.keys()
+    assert numbers(docstrings()[name]) <= ROWS.keys()
 
 
 def test_a_function_whose_first_line_ends_in_an_equation_stands_in_its_row():
-    for name, text in core_docstrings().items():
+    for name, text in docstrings().items():
         first = text.splitlines()[0]
         if (name.count(".") == 1) and (found := re.search(r"\(Eq\. [^)]*\)", first)):
             for number in numbers(found[0]):

@@ -126,8 +126,14 @@ def test_the_reference_has_signatures_and_docstrings(built):
     folder, _ = built
     for page, words in {
         "api": ["coramp.api.run", "coramp.api.RunResult", "Runs a scenario once"],
-        "safe-distance": ["coramp.core.safe_distance.safe_distance_m", "bumper to bumper (Eq. 1)"],
-        "audit": ["coramp.audit.checker.examine", "Returns whether the change may be committed"],
+        "safe-distance": [
+            "coramp.equations.safe_distance.safe_distance_m",
+            "bumper to bumper (Eq. 1)",
+        ],
+        "checker": [
+            "coramp.checker.checker.examine",
+            "Returns whether the change may be committed",
+        ],
     }.items():
         text = (folder / "reference" / f"{page}.html").read_text(encoding="utf-8")
         for word in words:

@@ -1,8 +1,6 @@
 """docs/symbols.md names every public quantity, with its unit, and nothing that is gone."""
 
-import importlib
 import math
-import pkgutil
 import re
 from pathlib import Path
 from types import UnionType
@@ -11,15 +9,14 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
-import coramp.core
-from coramp.metrics import schemas
-from coramp.run_folder import run_content
-from coramp.running import make_spec
-from coramp.scenario import Scenario
-from coramp.snapshots import Snapshot
+from coramp.records import schemas
+from coramp.runs.running import make_spec, run_content
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.snapshots import Snapshot
 from coramp.strategies.parameters import parameters_of
 from coramp.strategies.registry import strategies
 from coramp.studies.definition import Study
+from tests.mathematics import mathematics
 
 PAGE = Path(__file__).parents[2] / "docs" / "symbols.md"
 UNITS = {
@@ -99,16 +96,15 @@ def keys_of(model, prefix=""):
 
 
 def functions_that_cite():
-    """Returns the public functions of the core whose docstring cites an equation."""
+    """Returns the public functions of the mathematics whose docstring cites an equation."""
     found = set()
-    for module_info in pkgutil.iter_modules(coramp.core.__path__):
-        module = importlib.import_module(f"coramp.core.{module_info.name}")
+    for module_name, module in mathematics().items():
         for name, value in vars(module).items():
             function = getattr(value, "py_func", value)
             if getattr(function, "__module__", None) != module.__name__ or name.startswith("_"):
                 continue
             if not isinstance(value, type) and re.search(r"\(Eq\. \d", function.__doc__ or ""):
-                found.add(f"{module_info.name}.{name}")
+                found.add(f"{module_name}.{name}")
     return found
 
 
@@ -195,7 +191,8 @@ def test_every_function_that_cites_an_equation_stands_there():
 
 
 def test_every_function_named_exists():
+    modules = mathematics()
     for row in TABLES["The paper's symbols"]:
         if function := row["function"].strip("`"):
             module, name = function.split(".")
-            assert callable(getattr(importlib.import_module(f"coramp.core.{module}"), name))
+            assert callable(getattr(modules[module], name))

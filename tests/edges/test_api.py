@@ -10,7 +10,7 @@ import pytest
 
 import coramp
 import coramp.api
-from coramp.metrics.schemas import (
+from coramp.records.schemas import (
     DECISIONS,
     MEASURED,
     RUNS,

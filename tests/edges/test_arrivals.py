@@ -4,13 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import coramp
-from coramp.arrivals import (
+from coramp.demand.arrivals import (
     arrival_times_s,
     arrivals_of,
     changing_arrival_times_s,
     generator,
 )
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 
 STEP_S = 0.1
 

@@ -15,9 +15,9 @@ import sumo
 import coramp.api
 import coramp.studies.runner
 from coramp import CorampError
-from coramp.metrics.schemas import MEASURED
-from coramp.running import broken_promises
-from coramp.scenario import Scenario
+from coramp.records.schemas import MEASURED
+from coramp.runs.running import broken_promises
+from coramp.scenarios.model import Scenario
 from tests.edges import SMALL_STUDY, edited, everything_below, invoke
 
 VEHICLES = [
@@ -661,7 +661,7 @@ def test_help_is_quick_because_it_imports_nothing_heavy(arguments, light):
     heavy = {"numba", "numpy", "polars", "scipy", "libsumo", "matplotlib", "rich.table", *light}
     code = (
         "import sys\n"
-        "from coramp.cli import main\n"
+        "from coramp.cli.commands import main\n"
         "try:\n"
         f"    main({arguments!r})\n"
         "finally:\n"

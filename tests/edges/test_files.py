@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp import CorampError
-from coramp.files import (
+from coramp.records.files import (
     made_folder,
     read_json,
     staged_folder,
@@ -17,7 +17,7 @@ from coramp.files import (
     write_parquet,
     write_text,
 )
-from coramp.running import finite_or_none
+from coramp.runs.running import finite_or_none
 from tests.edges import everything_below
 
 

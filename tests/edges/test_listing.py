@@ -3,11 +3,11 @@ import json
 import pytest
 
 from coramp import _kernel
-from coramp.console import tell_of_compiling
+from coramp.cli.console import tell_of_compiling
+from coramp.cli.listing import listing
 from coramp.errors import CorampError
-from coramp.listing import listing
+from coramp.scenarios.toml_files import builtin_names
 from coramp.strategies.registry import register, strategies, strategy_named
-from coramp.toml_files import builtin_names
 from tests.edges import invoke
 
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from coramp import CorampError
-from coramp.loading import drivers_checked, load_scenario
-from coramp.scenario import Scenario
-from coramp.scenario_checks import decision_station_range_m, is_multiple
-from coramp.toml_files import builtin_names, parse_overrides, with_overrides
+from coramp.scenarios.checks import decision_station_range_m, is_multiple
+from coramp.scenarios.loading import drivers_checked, load_scenario
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.toml_files import builtin_names, parse_overrides, with_overrides
 from tests.edges import built_in, edited
 
 PAPER = load_scenario("paper")

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp import CorampError
-from coramp.planning import plan_snapshot
-from coramp.snapshots import Snapshot, load_snapshot
-from coramp.toml_files import validated
+from coramp.runs.planning import plan_snapshot
+from coramp.scenarios.snapshots import Snapshot, load_snapshot
+from coramp.scenarios.toml_files import validated
 from tests.edges import built_in, edited
 
 EXAMPLE = built_in("snapshots", "example")

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 import coramp.gym
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.mainline_priority import MainlinePriority
 from tests import situations
 

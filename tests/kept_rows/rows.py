@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.running import execute, failed_row, make_spec
+from coramp.runs.running import execute, failed_row, make_spec
 from tests.kept_rows.specs import Kept
 
 PATH = Path(__file__).parent / "rows.json.gz"

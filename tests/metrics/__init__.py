@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coramp.coordination.driven import MAINLINE, RAMP
-from coramp.loading import load_scenario
-from coramp.records import Outcome, Passages, Pieces
+from coramp.records.outcome import Outcome, Passages, Pieces
+from coramp.scenarios.loading import load_scenario
 
 PAPER = load_scenario("paper")
 NEVER = math.nan

@@ -8,9 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coramp.core.rules import packed
-from coramp.engines.outcomes import cooperative_outcome
-from coramp.loading import load_scenario
 from coramp.metrics.delay_bound import (
     Arrived,
     earliest_exits_s,
@@ -22,6 +19,9 @@ from coramp.metrics.delay_bound import (
     saved_s,
 )
 from coramp.metrics.tables import tables_of
+from coramp.road.rules import packed
+from coramp.scenarios.loading import load_scenario
+from coramp.worlds.outcomes import cooperative_outcome
 from tests.metrics import NEVER, PAPER, Car, outcome_of
 from tests.situations import COOPERATIVE, STEP_S, loop, situations
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coramp.core.trajectory import build
+from coramp.kinematics.trajectory import build
 from coramp.metrics.motion import (
     binned_motion,
     distance_of_each_m,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import coramp
-from coramp.loading import load_scenario
 from coramp.metrics.queues import crossings, queue_figures
-from coramp.records import Outcome, Passages, Pieces
+from coramp.records.outcome import Outcome, Passages, Pieces
+from coramp.scenarios.loading import load_scenario
 
 ROAD_M = 800.0
 

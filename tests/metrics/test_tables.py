@@ -5,12 +5,12 @@ import polars as pl
 import pytest
 
 from coramp.coordination.coordinator import DecisionRecord, Refusal
-from coramp.metrics.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS
 from coramp.metrics.tables import (
     decisions_table,
     tables_of,
     trajectories_table,
 )
+from coramp.records.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS
 from coramp.strategies.base import Explanation
 from tests.metrics import NEVER, PAPER, Car, outcome_of
 

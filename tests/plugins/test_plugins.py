@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import coramp
+from coramp.cli.skeleton import write_skeleton
 from coramp.coordination.guard import Guarded
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
-from coramp.skeleton import write_skeleton
 from coramp.strategies.base import Decision, DriveWithAcceleration, FollowTrajectory
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.parameters import parameter
@@ -336,7 +336,7 @@ def installed(folder, name, module, source, entry):
 
 def coramp_with(folder, *words):
     return subprocess.run(
-        [sys.executable, "-c", "from coramp.cli import main; main()", *words],
+        [sys.executable, "-c", "from coramp.cli.commands import main; main()", *words],
         env={**os.environ, "PYTHONPATH": str(folder)},
         capture_output=True,
         text=True,

@@ -7,12 +7,12 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 import coramp
-from coramp.core.trajectory import station_and_speed
 from coramp.errors import CorampError
-from coramp.metrics.schemas import RESULT_VERSION
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.records.run_folder import read_run
+from coramp.records.schemas import RESULT_VERSION
 from coramp.report.plan_figure import pieces_of_each
-from coramp.reporting import replay, report
-from coramp.run_folder import read_run
+from coramp.report.writing import replay, report
 from tests.report.browser import chromium, in_browser, opened
 
 TRAFFIC = {"mainline_veh_h": 1800.0, "ramp_veh_h": 500.0, "seed": 77, "horizon_s": 120.0}

@@ -6,10 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from coramp.loading import load_scenario
-from coramp.metrics.schemas import DECISIONS, SPEEDS
+from coramp.records.schemas import DECISIONS, SPEEDS
 from coramp.report.road_figure import road_figure
 from coramp.report.run_figures import DrawnRun, margin_distribution, margin_figure, speed_figure
+from coramp.scenarios.loading import load_scenario
 
 
 def drawn(strategy="mainline-priority", drivers=None, ramp=200.0, seed=1, mps=20.0, margins=()):

@@ -9,10 +9,10 @@ from matplotlib.colors import to_hex
 
 import coramp
 from coramp import CorampError
+from coramp.explain.story import story_in
+from coramp.records.run_folder import StoredRun, read_run
 from coramp.report.story_figure import save_story_figure, story_figure
 from coramp.report.story_scene import scene_of
-from coramp.run_folder import StoredRun, read_run
-from coramp.story import story_in
 from tests.edges import assert_refused, everything_below, invoke
 
 LENGTH_M = 5.0

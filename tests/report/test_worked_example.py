@@ -2,10 +2,10 @@
 
 import pytest
 
-from coramp.planning import plan_snapshot
 from coramp.report.plan_figure import plan_figure
 from coramp.report.worked_example import free_movement, positions_figure, time_space_figure
-from coramp.snapshots import load_snapshot
+from coramp.runs.planning import plan_snapshot
+from coramp.scenarios.snapshots import load_snapshot
 
 V0, VR0 = 100.0 / 3.6, 60.0 / 3.6
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp.coordination.ledger import Ledger
-from coramp.core.rules import packed
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
+from coramp.road.rules import packed
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.alinea import Alinea
 from coramp.strategies.base import Detectors, SetRampSignal, View
 

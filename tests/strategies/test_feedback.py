@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coramp.coordination.ledger import Ledger
-from coramp.core.rules import packed
-from coramp.loading import load_scenario
+from coramp.road.rules import packed
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.feedback import (
     MAINLINE,
     RAMP,

@@ -3,8 +3,8 @@
 import pytest
 
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
-from coramp.running import execute, make_spec
+from coramp.runs.running import execute, make_spec
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.parameters import parameters_of, wrong_settings
 from coramp.strategies.registry import strategies, strategy_named
 

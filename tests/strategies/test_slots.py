@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coramp.coordination.plant import Arrival
-from coramp.core.trajectory import cruise_intercept_m
-from coramp.engines.exact.engine import run_exact
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
+from coramp.kinematics.trajectory import cruise_intercept_m
 from coramp.metrics.tables import tables_of
+from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import EntryPolicy
 from coramp.strategies.slots import Slots
+from coramp.worlds.exact.engine import run_exact
 from tests.situations import driven, least_margin_m, loop, named, traffic
 
 HEADWAY_S = 1.257

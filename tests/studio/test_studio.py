@@ -10,7 +10,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 import coramp
-from coramp.cli import main
+from coramp.cli.commands import main
 from coramp.errors import CorampError
 from coramp.studio.answers import Answers
 from coramp.studio.dials import studio_of

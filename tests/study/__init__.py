@@ -2,7 +2,7 @@
 
 import polars as pl
 
-from coramp.metrics.schemas import MEASURED, RUN_METRICS, RUNS
+from coramp.records.schemas import MEASURED, RUN_METRICS, RUNS
 
 GRID = """
 name = "grid"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp.report.capacity_figure import capacity_figure
-from coramp.running import make_spec
+from coramp.runs.running import make_spec
 from coramp.studies.breakdown import Bisection, bisections, broke_down
 from coramp.studies.capacity_layout import breakdowns, capacity_tables
 from coramp.studies.definition import Search, count_runs, load_study

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp import CorampError
-from coramp.running import RunSpec, make_spec
+from coramp.runs.running import RunSpec, make_spec
 from coramp.studies.definition import expand, load_study, sort_key
 from tests.edges import built_in, edited
 from tests.study import GRID, written
@@ -165,7 +165,7 @@ class TestRunId:
 
     def test_it_is_the_same_in_another_process(self):
         code = (
-            "from coramp.running import make_spec\n"
+            "from coramp.runs.running import make_spec\n"
             "print(make_spec('paper', 'uncontrolled', drivers='paper', seed=3).run_id)\n"
         )
         result = subprocess.run(
@@ -205,7 +205,7 @@ class TestRunId:
         assert labelled.run_id == self.SPEC.run_id
 
     @pytest.mark.parametrize(
-        "target", ["coramp.running.RESULT_VERSION", "coramp.running.metadata.version"]
+        "target", ["coramp.runs.running.RESULT_VERSION", "coramp.runs.running.metadata.version"]
     )
     def test_versions_count(self, monkeypatch, target):
         changed = 99 if target.endswith("RESULT_VERSION") else (lambda _: "9.9.9")

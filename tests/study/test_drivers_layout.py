@@ -3,7 +3,7 @@
 import polars as pl
 import pytest
 
-from coramp.metrics.schemas import RUNS
+from coramp.records.schemas import RUNS
 from coramp.studies.definition import expand, load_study
 from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.overrides import overrides_of, setting_of

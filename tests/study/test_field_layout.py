@@ -5,7 +5,7 @@ import math
 import polars as pl
 import pytest
 
-from coramp.metrics.schemas import RUNS
+from coramp.records.schemas import RUNS
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.front_figure import front_figure

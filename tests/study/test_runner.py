@@ -13,8 +13,8 @@ import pytest
 import coramp.studies.runner
 from coramp import CorampError
 from coramp.api import study
-from coramp.metrics.schemas import MEASURED
-from coramp.running import RunSpec, make_spec
+from coramp.records.schemas import MEASURED
+from coramp.runs.running import RunSpec, make_spec
 from coramp.studies.runner import execute_part, run_missing
 from coramp.studies.store import Part
 from tests.edges import invoke
@@ -369,7 +369,7 @@ def test_a_full_disk_stops_a_study_and_keeps_what_was_done(whole, copied, monkey
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
-        patched.setattr("coramp.files.os.fsync", full_after_three)
+        patched.setattr("coramp.records.files.os.fsync", full_after_three)
         with pytest.raises(CorampError, match="No space left on device; runs that are done are"):
             start(copied, jobs=2)
     assert not recwarn.list

@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from coramp import CorampError
-from coramp.metrics.schemas import RUNS, STREAMS
-from coramp.running import make_spec
+from coramp.records.schemas import RUNS, STREAMS
+from coramp.runs.running import make_spec
 from coramp.studies.definition import load_study
 from coramp.studies.store import Part, Store
 from tests.study import run_row, written

@@ -3,7 +3,7 @@
 import polars as pl
 import pytest
 
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 from coramp.studies.breakdown import BREAKDOWN_DELAY_S
 from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.lane_breakdown import lane_flows_veh_h, least_delay_s, mean_bound_s

@@ -1,1 +1,1 @@
-"""The loop that engines and a live service share: events, commitments, audit, records."""
+"""The loop that engines and a live service share: events, examination, commitments, records."""

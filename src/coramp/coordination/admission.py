@@ -9,8 +9,18 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.approach import append_stop, harmonise, stop_of_m, stop_starts_s
-from coramp.core.fleet import (
+from coramp.equations.safe_distance import standing_clearance_m
+from coramp.kinematics.trajectory import (
+    MAX_PIECES,
+    intercept_range_m,
+    station_and_speed,
+    time_at_station,
+)
+from coramp.motion.approach import append_stop, harmonise, stop_of_m, stop_starts_s
+from coramp.road.rules import Rules
+from coramp.strategies.proposals import largest_safe_distance_m
+from coramp.strategies.ramp_queue import propose_place_ahead
+from coramp.vehicles.fleet import (
     ROUNDING_M,
     Fleet,
     Proposal,
@@ -18,16 +28,6 @@ from coramp.core.fleet import (
     empty_proposal,
     pair_margin_m,
     trajectory_under,
-)
-from coramp.core.proposals import largest_safe_distance_m
-from coramp.core.ramp_queue import propose_place_ahead
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import standing_clearance_m
-from coramp.core.trajectory import (
-    MAX_PIECES,
-    intercept_range_m,
-    station_and_speed,
-    time_at_station,
 )
 
 LEAST_MOVE_M = 1.0

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.core.fleet import Fleet, committed
-from coramp.core.trajectory import (
+from coramp.kinematics.trajectory import (
     MAX_PIECES,
     intercept_range_m,
     station_and_speed,
     time_at_station,
 )
+from coramp.vehicles.fleet import Fleet, committed
 
 ROWS, PIECES, LIVE, BLOCKS = range(4)
 """Places in ``Book.used``."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.audit.reasons import ACCEPTED, HOLDS_NEWCOMERS, REASONS
+from coramp.checker.reasons import ACCEPTED, HOLDS_NEWCOMERS, REASONS
 from coramp.coordination.admission import (
     decision_due_s,
     plan_moving_up,
@@ -35,10 +35,9 @@ from coramp.coordination.ledger import Ledger
 from coramp.coordination.newcomers import Newcomers
 from coramp.coordination.plant import Arrival, Plant
 from coramp.coordination.supervisor import drive_safely
-from coramp.core.approach import stop_starts_s
-from coramp.core.fleet import proposed
-from coramp.core.rules import Rules, packed
-from coramp.core.trajectory import station_and_speed
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.motion.approach import stop_starts_s
+from coramp.road.rules import Rules, packed
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -51,6 +50,7 @@ from coramp.strategies.base import (
     period_of,
     steps_of_period,
 )
+from coramp.vehicles.fleet import proposed
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ import numpy as np
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.coordination.book import BLOCKS
 from coramp.coordination.ledger import Ledger
-from coramp.core.trajectory import (
+from coramp.kinematics.trajectory import (
     ACCEL,
     SPEED,
     STATION,

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from coramp._kernel import kernel
-from coramp.audit.checker import Change, Verdict, examine
-from coramp.audit.distances import Bounds
+from coramp.checker.checker import Change, Verdict, examine
+from coramp.checker.distances import Bounds
 from coramp.coordination.book import Book, fleet_of
 from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
-from coramp.core.fleet import MAX_CHANGED, committed
-from coramp.core.rules import Rules
-from coramp.core.trajectory import MAX_PIECES, TIME, station_and_speed
+from coramp.kinematics.trajectory import MAX_PIECES, TIME, station_and_speed
+from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
+from coramp.vehicles.fleet import MAX_CHANGED, committed
 
 
 def bounds_of(rules: Rules) -> Bounds:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.audit.checker import Change, Vehicles, examine
-from coramp.audit.distances import Bounds
-from coramp.audit.reasons import ACCEPTED
+from coramp.checker.checker import Change, Vehicles, examine
+from coramp.checker.distances import Bounds
+from coramp.checker.reasons import ACCEPTED
 from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_full, strike_exited
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
-from coramp.core.rules import Rules, unpacked
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
 
 NEVER = 1 << 60

@@ -6,9 +6,8 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from coramp.coordination.time_limit import TooLong, time_limit
-from coramp.core.fleet import MAX_CHANGED
-from coramp.core.trajectory import MAX_PIECES
 from coramp.errors import CorampError
+from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -25,6 +24,7 @@ from coramp.strategies.base import (
 )
 from coramp.strategies.registry import OURS, origin_of, strategy_named
 from coramp.strategies.situation import RUNGS
+from coramp.vehicles.fleet import MAX_CHANGED
 
 LONGEST_DECISION_S = 10.0
 """Wall time after which a decision counts as one that never comes; compiling does not count."""

@@ -17,8 +17,8 @@ from coramp.coordination.book import (
     with_room,
     write_commitment,
 )
-from coramp.core.fleet import Fleet
 from coramp.strategies.base import Reports
+from coramp.vehicles.fleet import Fleet
 
 
 @dataclass(frozen=True, slots=True)

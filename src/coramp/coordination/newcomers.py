@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 from coramp.coordination.ledger import Ledger
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import merge_clearance_m
-from coramp.core.trajectory import station_and_speed
+from coramp.equations.safe_distance import merge_clearance_m
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
 from coramp.strategies.situation import foremost_unknown_m
 

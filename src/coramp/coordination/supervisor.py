@@ -12,22 +12,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.audit.checker import Change, examine
-from coramp.audit.distances import Bounds
-from coramp.audit.reasons import ACCEPTED
+from coramp.checker.checker import Change, examine
+from coramp.checker.distances import Bounds
+from coramp.checker.reasons import ACCEPTED
 from coramp.coordination.book import Book, fleet_of
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.gate import vehicles_of
 from coramp.coordination.ledger import Ledger
-from coramp.core.approach import stop_of_m
-from coramp.core.driving import hold_then_cruise, hold_then_merge, hold_then_stop
-from coramp.core.fleet import Fleet, committed
-from coramp.core.ramp_queue import next_ahead_on_ramp
-from coramp.core.rules import Rules, unpacked
-from coramp.core.safe_distance import merge_clearance_m, standing_clearance_m
-from coramp.core.trajectory import MAX_PIECES, TIME, cruise_intercept_m, station_and_speed
+from coramp.equations.safe_distance import merge_clearance_m, standing_clearance_m
+from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m, station_and_speed
+from coramp.motion.approach import stop_of_m
+from coramp.motion.driving import hold_then_cruise, hold_then_merge, hold_then_stop
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import DriveWithAcceleration
+from coramp.strategies.ramp_queue import next_ahead_on_ramp
 from coramp.strategies.situation import foremost_unknown_m
+from coramp.vehicles.fleet import Fleet, committed
 
 MOST_PASSES = 3
 """A command that another one stands in the way of is tried again after that."""

@@ -15,11 +15,17 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, kernel
-from coramp.core.approach import harmonise
-from coramp.core.gaps import least_acceleration_mps2
-from coramp.core.rules import Rules, unpacked
-from coramp.core.safe_distance import following_clearance_m
-from coramp.core.trajectory import MAX_PIECES, SPEED, clip_end, drive_to_speed, time_at_station
+from coramp.equations.gaps import least_acceleration_mps2
+from coramp.equations.safe_distance import following_clearance_m
+from coramp.kinematics.trajectory import (
+    MAX_PIECES,
+    SPEED,
+    clip_end,
+    drive_to_speed,
+    time_at_station,
+)
+from coramp.motion.approach import harmonise
+from coramp.road.rules import Rules, unpacked
 
 SECONDS_PER_HOUR = 3600.0
 NOTHING_SAVED = np.zeros(1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.trajectory import STATION, TIME
+from coramp.kinematics.trajectory import STATION, TIME
 
 TOLERANCE_M = 0.05
 """How far a fitted piece may be from a sample."""

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.core.rules import packed
 from coramp.metrics.delay_bound import (
     Arrived,
     earliest_exits_s,
@@ -17,8 +16,9 @@ from coramp.metrics.delay_bound import (
     saved_s,
 )
 from coramp.metrics.motion import hard_brakings, stopped_vehicles
-from coramp.records import Outcome
-from coramp.scenario import Scenario
+from coramp.records.outcome import Outcome
+from coramp.road.rules import packed
+from coramp.scenarios.model import Scenario
 
 BOUND_FIGURES = (
     "delay_bound_s",

@@ -7,7 +7,7 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.driven import MAINLINE
 from coramp.metrics.separations import LaneUse
-from coramp.records import Outcome
+from coramp.records.outcome import Outcome
 
 
 def lane_uses(outcome: Outcome) -> tuple[LaneUse, LaneUse]:

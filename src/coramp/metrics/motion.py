@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.core.fuel import trajectory_fuel_l
-from coramp.core.trajectory import ACCEL, SPEED, TIME, piece_end_s, time_at_station
+from coramp.kinematics.fuel import trajectory_fuel_l
+from coramp.kinematics.trajectory import ACCEL, SPEED, TIME, piece_end_s, time_at_station
 
 BIN_S = 1.0
 JERK_S = 1.0

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.core.trajectory import ACCEL, SPEED, STATION, TIME
-from coramp.records import Outcome, Pieces
-from coramp.scenario import Scenario
+from coramp.kinematics.trajectory import ACCEL, SPEED, STATION, TIME
+from coramp.records.outcome import Outcome, Pieces
+from coramp.scenarios.model import Scenario
 
 INTERVAL_S = 300.0
 SUSTAINED = 3

@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.core.conflict_risk import conflict_severity_m2ps4
-from coramp.core.rules import SafetyBudget
-from coramp.core.safe_distance import merge_distance_m, merging_speed_along_mps
-from coramp.core.separation import smallest_margin_m
-from coramp.core.trajectory import (
+from coramp.equations.conflict_risk import conflict_severity_m2ps4
+from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
+from coramp.kinematics.trajectory import (
     ACCEL,
     SPEED,
     STATION,
@@ -25,6 +23,8 @@ from coramp.core.trajectory import (
     piece_end_s,
     station_and_speed,
 )
+from coramp.road.rules import SafetyBudget
+from coramp.vehicles.separation import smallest_margin_m
 
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""

@@ -23,7 +23,6 @@ from coramp.metrics.motion import (
     largest_jerk_mps3,
 )
 from coramp.metrics.queues import queue_figures
-from coramp.metrics.schemas import DECISIONS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS, Schema
 from coramp.metrics.separations import (
     DRAC,
     FIGURES,
@@ -34,12 +33,18 @@ from coramp.metrics.separations import (
     lane_extremes,
 )
 from coramp.metrics.separations import VIOLATIONS as COUNT
-from coramp.records import LANES, Outcome
-from coramp.scenario import Scenario
+from coramp.records.outcome import LANES, Outcome
+from coramp.records.schemas import (
+    DECISIONS,
+    SPEEDS,
+    TRAJECTORIES,
+    VEHICLES,
+    VIOLATIONS,
+    Row,
+    Schema,
+)
+from coramp.scenarios.model import Scenario
 from coramp.strategies.situation import RUNGS
-
-Row = dict[str, Any]
-
 
 Columns = Mapping[str, Any]
 """Columns of a table by name: arrays, nan for what is not there."""

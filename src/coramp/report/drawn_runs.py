@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from coramp.files import made_folder, staged_folder
+from coramp.records.files import made_folder, staged_folder
+from coramp.records.run_folder import MARK, StoredRun, read_run, write_run
 from coramp.report.run_figures import DrawnRun
-from coramp.run_folder import MARK, StoredRun, read_run, write_run
-from coramp.running import RunSpec, execute, make_spec
+from coramp.runs.running import RunSpec, execute, make_spec, run_content
 from coramp.studies.runner import Progress
 from coramp.studies.store import Part
 
@@ -58,8 +58,7 @@ def drawn_runs(
     for done, spec in enumerate(missing, 1):
         with staged_folder(folder / spec.run_id, MARK) as stage:
             tables, row = execute(spec)
-            frames = tables.frames()
-            write_run(stage, spec, frames, row)
+            write_run(stage, run_content(spec, row), tables.frames())
         report(Progress(len(specs), done, skipped, 0, 0, Part(row, [])))
     return [_drawn(spec, read_run(folder / spec.run_id)) for spec in specs]
 

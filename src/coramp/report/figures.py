@@ -7,9 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from coramp.files import made_folder
-from coramp.loading import load_scenario
-from coramp.planning import plan_snapshot
+from coramp.records.files import made_folder
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -22,7 +20,9 @@ from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import StoredStudy
 from coramp.report.style import save_figure
 from coramp.report.worked_example import positions_figure, time_space_figure
-from coramp.snapshots import load_snapshot
+from coramp.runs.planning import plan_snapshot
+from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.snapshots import load_snapshot
 
 FORMATS = ("svg", "png")
 SCENARIO, EXAMPLE = "paper", "example"

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coramp._kernel import FloatArray
-from coramp.core.conflict_risk import collision_acceleration_of_log_ratio_mps2
-from coramp.core.fuel import fuel_rate_mlps
+from coramp.equations.conflict_risk import collision_acceleration_of_log_ratio_mps2
+from coramp.kinematics.fuel import fuel_rate_mlps
 from coramp.report.style import COLOURS, LINES, grid, new_figure
 
 COLLISION_LOG_RATIOS = (-3.0, -1.0, 0.0, 0.5, 1.0)

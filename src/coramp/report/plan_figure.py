@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from coramp._kernel import FloatArray
-from coramp.core.trajectory import station_and_speed
-from coramp.planning import PlannedSnapshot
+from coramp.kinematics.trajectory import station_and_speed
 from coramp.report.style import (
     BLUE,
     GREY,
@@ -22,6 +21,7 @@ from coramp.report.style import (
     new_figure,
     save_plot,
 )
+from coramp.runs.planning import PlannedSnapshot
 
 RAMP_COLOUR, MOVED_COLOUR, MAINLINE_COLOUR = VERMILION, BLUE, GREY
 POINTS = 400
@@ -70,7 +70,7 @@ def moved_vehicles(planned: PlannedSnapshot) -> set[str]:
 
 
 def pieces_of_each(trajectories: pl.DataFrame) -> Iterator[tuple[str, FloatArray, bool]]:
-    """Yields each vehicle's name, its pieces as in ``core.trajectory``, and if it is on a ramp."""
+    """Yields of each vehicle: name, pieces (``kinematics.trajectory``), whether it is on a ramp."""
     for (name,), pieces in trajectories.group_by(["vehicle_id"], maintain_order=True):
         rows = np.ascontiguousarray(pieces.select(COLUMNS).to_numpy())
         yield str(name), rows, "ramp" in pieces["lane"]

@@ -6,7 +6,6 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coramp.engines.sumo.network import LANE_WIDTH_M, network_file, road_plan
 from coramp.report.style import (
     BLACK,
     BLUE,
@@ -18,7 +17,8 @@ from coramp.report.style import (
     legend_below,
     new_figure,
 )
-from coramp.scenario import Scenario
+from coramp.scenarios.model import Scenario
+from coramp.worlds.sumo.network import LANE_WIDTH_M, network_file, road_plan
 
 LANES = {
     "mainline_0": ("mainline", BLUE),

@@ -8,8 +8,8 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coramp.loading import load_scenario
 from coramp.report.style import BLACK, COLOURS, LINES, MARKERS, grid, legend_below, new_figure
+from coramp.scenarios.loading import load_scenario
 from coramp.studies.sensitivity_layout import BREAKDOWN_DELAY_S
 from coramp.studies.statistics import estimate
 

@@ -7,6 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coramp.records.run_folder import StoredRun
 from coramp.report.plan_figure import name_lines
 from coramp.report.story_road import draw_road, label_in, look_in
 from coramp.report.story_scene import Scene, scene_of
@@ -19,7 +20,6 @@ from coramp.report.style import (
     new_figure,
     save_plot,
 )
-from coramp.run_folder import StoredRun
 
 STEP_S = 0.1
 

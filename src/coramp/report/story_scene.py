@@ -9,13 +9,13 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import FloatArray
-from coramp.core.safe_distance import merge_clearance_m
-from coramp.core.trajectory import TIME, station_and_speed
+from coramp.equations.safe_distance import merge_clearance_m
 from coramp.errors import CorampError
-from coramp.metrics.tables import Row
+from coramp.kinematics.trajectory import TIME, station_and_speed
+from coramp.records.run_folder import StoredRun, moved_for
+from coramp.records.schemas import Row
 from coramp.report.plan_figure import COLUMNS
-from coramp.run_folder import StoredRun, moved_for
-from coramp.scenario import Scenario
+from coramp.scenarios.model import Scenario
 
 BEFORE_S, AFTER_S, WITHOUT_MERGE_S = 3.0, 4.0, 20.0
 """How long before a decision and after its merge is shown, and how long if there is no merge."""
@@ -26,7 +26,7 @@ AHEAD, BEHIND = "leaves before it", "leaves after it"
 
 @dataclass(frozen=True)
 class Driven:
-    """What a vehicle drove: pieces as in ``core.trajectory``, from its entry to its exit.
+    """What a vehicle drove: pieces as in ``kinematics.trajectory``, from its entry to its exit.
 
     On the mainline it is from ``merge_s`` on: minus infinity for mainline vehicles, infinity for
     ramp vehicles that never merged.

@@ -6,7 +6,7 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.files import read_json
+from coramp.records.files import read_json
 from coramp.studies.store import MARK
 
 DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline")

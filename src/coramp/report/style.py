@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - the API's annotations name it
 
 from coramp.errors import CorampError
-from coramp.files import write_bytes
+from coramp.records.files import write_bytes
 
 BLUE, VERMILION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 SKY, ORANGE, BLACK, GREY, YELLOW = "#56b4e9", "#e69f00", "#000000", "#7f7f7f", "#f0e442"

@@ -5,10 +5,10 @@ import math
 from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
+from coramp.records.run_folder import StoredRun
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
 from coramp.report.style import YELLOW, grid, legend_below, new_figure
-from coramp.run_folder import StoredRun
 
 WINDOW_S = 120.0
 """How long the window is where its end is not given."""

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from coramp._kernel import FloatArray
-from coramp.core.free_movement import acceleration_time_s, nose_time_s, ramp_trajectory
-from coramp.core.trajectory import station_and_speed
-from coramp.planning import PlannedSnapshot
+from coramp.equations.free_movement import acceleration_time_s, nose_time_s, ramp_trajectory
+from coramp.kinematics.trajectory import station_and_speed
 from coramp.report.plan_figure import (
     MAINLINE_COLOUR,
     MOVED_COLOUR,
@@ -26,6 +25,7 @@ from coramp.report.plan_figure import (
     pieces_of_each,
 )
 from coramp.report.style import BLACK, YELLOW, grid, legend_below, new_figure
+from coramp.runs.planning import PlannedSnapshot
 
 NEAR_S, NEAR_M = 1.6, 48.0
 """How far the enlarged diagram goes from the merge of free movement."""

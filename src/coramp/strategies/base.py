@@ -13,8 +13,8 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.core.fleet import Fleet
-from coramp.core.rules import Rules
+from coramp.road.rules import Rules
+from coramp.vehicles.fleet import Fleet
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class View:
     which mainline vehicles enter. ``ask_reports`` fetches the live vehicles' last reports for
     ``reports``; ``ask_entered`` who has entered since the strategy was last asked, for ``entered``;
     ``ask_waiting`` who waits outside, for ``waiting``. ``packed_rules`` are the rules as kernels
-    take them (``core.rules``).
+    take them (``road.rules``).
     ``detectors`` is None where the road has none. A strategy must not write into any of the arrays.
     """
 

@@ -5,8 +5,16 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.approach import brake_and_go, late_approach, late_start, stop_of_m
-from coramp.core.fleet import (
+from coramp.equations.ramp_acceleration import lag_m
+from coramp.equations.safe_distance import gap_time_s
+from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed
+from coramp.motion.approach import brake_and_go, late_approach, late_start, stop_of_m
+from coramp.road.rules import Rules
+from coramp.strategies.proposals import find_unsafe_pair, propose_merge, push_back
+from coramp.strategies.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
+from coramp.strategies.rungs import Merge, no_merge, unknown_bound_m
+from coramp.strategies.situation import Situation, gap_bounds_m, situation_from
+from coramp.vehicles.fleet import (
     ROUNDING_M,
     Fleet,
     Proposal,
@@ -15,14 +23,6 @@ from coramp.core.fleet import (
     pair_margin_m,
     proposed,
 )
-from coramp.core.proposals import find_unsafe_pair, propose_merge, push_back
-from coramp.core.ramp_acceleration import lag_m
-from coramp.core.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import gap_time_s
-from coramp.core.trajectory import MAX_PIECES, station_and_speed
-from coramp.strategies.rungs import Merge, no_merge, unknown_bound_m
-from coramp.strategies.situation import Situation, gap_bounds_m, situation_from
 
 EVENLY, AT_ONCE, AT_THE_STOP = range(3)
 """How a ramp vehicle that comes late loses its time."""

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.fleet import Fleet, committed
-from coramp.core.ramp_acceleration import lag_m
-from coramp.core.rules import Rules, unpacked
-from coramp.core.trajectory import station_and_speed
+from coramp.equations.ramp_acceleration import lag_m
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.rules import Rules, unpacked
+from coramp.vehicles.fleet import Fleet, committed
 
 RAMP, LANE, MAINLINE = range(3)
 """Stages of a vehicle: before the nose, on the acceleration lane, on the mainline."""

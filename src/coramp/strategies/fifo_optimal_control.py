@@ -18,7 +18,7 @@ class FifoOptimalControl:
     """Vehicles merge in the order in which they would in free movement, with the least effort.
 
     The merge times follow one another: ``t_i = max(t_i free, t_(i-1) + h)`` with h from the safe
-    distance. Each trajectory to its merge minimises ``1/2 int u^2 dt`` (``core.least_effort``).
+    distance. Each trajectory to its merge minimises ``1/2 int u^2 dt`` (``motion.least_effort``).
     Where it comes too near to another vehicle, that of the ladder's rungs in the same place is
     taken.
     """

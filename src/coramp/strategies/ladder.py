@@ -4,11 +4,10 @@ import math
 from collections.abc import Callable
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.conflict_risk import conflict_severity_m2ps4
-from coramp.core.fleet import Fleet, Proposal, committed, trajectory_under
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import merging_speed_along_mps
-from coramp.core.trajectory import station_and_speed
+from coramp.equations.conflict_risk import conflict_severity_m2ps4
+from coramp.equations.safe_distance import merging_speed_along_mps
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.rules import Rules
 from coramp.strategies.base import Decision, Explanation, FollowTrajectory, Memory, View
 from coramp.strategies.rungs import Merge
 from coramp.strategies.situation import (
@@ -18,6 +17,7 @@ from coramp.strategies.situation import (
     Situation,
     gap_size_m,
 )
+from coramp.vehicles.fleet import Fleet, Proposal, committed, trajectory_under
 
 Planner = Callable[[Fleet, int, float, float, FloatArray], tuple[MergePlan, Proposal, bool, int]]
 

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.core.fleet import MAX_CHANGED, Fleet, Proposal, committed, empty_proposal
-from coramp.core.gap_creation import cascade_shift_m
-from coramp.core.least_effort import constrained_optimum, held_shift, speeds_mps
-from coramp.core.proposals import find_unsafe_pair
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import following_clearance_m
-from coramp.core.trajectory import MAX_PIECES, build, station_and_speed, superpose
+from coramp.equations.gap_creation import cascade_shift_m
+from coramp.equations.safe_distance import following_clearance_m
+from coramp.kinematics.trajectory import MAX_PIECES, build, station_and_speed, superpose
+from coramp.motion.least_effort import constrained_optimum, held_shift, speeds_mps
+from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.ladder import plan_of
+from coramp.strategies.proposals import find_unsafe_pair
 from coramp.strategies.rungs import Merge, unknown_bound_m
 from coramp.strategies.situation import (
     RUNG_CREATE,
@@ -29,6 +28,7 @@ from coramp.strategies.situation import (
     conflict_position,
     gap_bounds_m,
 )
+from coramp.vehicles.fleet import MAX_CHANGED, Fleet, Proposal, committed, empty_proposal
 
 MOST_PERIODS = MAX_PIECES - 8
 """Pieces of one trajectory; some are left for what was committed before."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.fleet import Fleet, Proposal, empty_proposal
-from coramp.core.rules import Rules, unpacked
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
@@ -26,6 +25,7 @@ from coramp.strategies.situation import (
     gaps_by_preference,
     ramp_neighbours,
 )
+from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 import quadprog as untyped_quadprog
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.core.rules import Rules
+from coramp.road.rules import Rules
 from coramp.strategies.base import Decision, Memory, View, held_period_s
 from coramp.strategies.feedback import LANE, MAINLINE, Platoon, virtual_platoon
 from coramp.strategies.parameters import parameter

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal, proposed
-from coramp.core.rules import Rules, unpacked
-from coramp.core.trajectory import cruise_intercept_m
+from coramp.kinematics.trajectory import cruise_intercept_m
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
@@ -35,6 +34,7 @@ from coramp.strategies.situation import (
     gap_of_free_movement,
     ramp_neighbours,
 )
+from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, proposed
 
 
 @kernel

@@ -10,23 +10,23 @@ import math
 from typing import NamedTuple
 
 from coramp._kernel import kernel
-from coramp.core.fleet import (
-    ROUNDING_M,
-    Fleet,
-    Proposal,
-)
-from coramp.core.proposals import (
+from coramp.equations.ramp_acceleration import acceleration_for_lag_mps2
+from coramp.road.rules import Rules
+from coramp.strategies.proposals import (
     find_unsafe_pair,
     propose_merge,
     push_ahead,
     push_back,
 )
-from coramp.core.ramp_acceleration import acceleration_for_lag_mps2
-from coramp.core.rules import Rules
 from coramp.strategies.situation import (
     Situation,
     gap_bounds_m,
     gap_of_free_movement,
+)
+from coramp.vehicles.fleet import (
+    ROUNDING_M,
+    Fleet,
+    Proposal,
 )
 
 

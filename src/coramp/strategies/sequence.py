@@ -11,16 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal
-from coramp.core.ramp_queue import next_behind_on_ramp
-from coramp.core.rules import Rules, unpacked
-from coramp.core.safe_distance import following_clearance_m, merge_clearance_m
-from coramp.core.trajectory import station_and_speed
+from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_late
 from coramp.strategies.feedback import place_on_mainline
 from coramp.strategies.ladder import decide_first, plan_of
 from coramp.strategies.least_effort_planner import LeastEffort
+from coramp.strategies.ramp_queue import next_behind_on_ramp
 from coramp.strategies.rungs import create, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
@@ -34,6 +33,7 @@ from coramp.strategies.situation import (
     lane_order,
     ramp_neighbours,
 )
+from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
 
 LEAST_EFFORT = LeastEffort()
 LATER_FIRST = 0.25

@@ -6,21 +6,21 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.core.approach import approach_without_stop
-from coramp.core.conflict import conflict_index
-from coramp.core.fleet import Fleet, committed
-from coramp.core.gaps import least_acceleration_mps2
-from coramp.core.ramp_acceleration import lag_m
-from coramp.core.ramp_queue import next_behind_on_ramp
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import merge_clearance_m
-from coramp.core.trajectory import (
+from coramp.equations.conflict import conflict_index
+from coramp.equations.gaps import least_acceleration_mps2
+from coramp.equations.ramp_acceleration import lag_m
+from coramp.equations.safe_distance import merge_clearance_m
+from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
     TIME,
     cruise_intercept_m,
     station_and_speed,
 )
+from coramp.motion.approach import approach_without_stop
+from coramp.road.rules import Rules
+from coramp.strategies.ramp_queue import next_behind_on_ramp
+from coramp.vehicles.fleet import Fleet, committed
 
 RUNG_FREE, RUNG_REACH, RUNG_CREATE, RUNG_DELAY, RUNG_HOLD = range(5)
 RUNGS = ("free", "reach", "create", "delay", "hold")

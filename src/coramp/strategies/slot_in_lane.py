@@ -10,13 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.approach import change_speed
-from coramp.core.fleet import Fleet, Proposal, committed, empty_proposal
-from coramp.core.proposals import find_unsafe_pair
-from coramp.core.rules import Rules, unpacked
-from coramp.core.safe_distance import following_clearance_m, merge_clearance_m
-from coramp.core.slow_phase import least_effort_way, slow_phase
-from coramp.core.trajectory import (
+from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
+from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
     STATION,
@@ -27,6 +22,11 @@ from coramp.core.trajectory import (
     drive_to_speed,
     station_and_speed,
 )
+from coramp.motion.approach import change_speed
+from coramp.motion.slow_phase import least_effort_way, slow_phase
+from coramp.road.rules import Rules, unpacked
+from coramp.strategies.proposals import find_unsafe_pair
+from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
 
 SLOWEST_SHARE = 0.5
 """Of v0: what a slower cruise on the mainline does not go below."""

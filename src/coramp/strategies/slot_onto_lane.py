@@ -6,14 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.approach import change_speed
-from coramp.core.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
-from coramp.core.gaps import least_acceleration_mps2
-from coramp.core.proposals import find_unsafe_pair, propose_merge
-from coramp.core.ramp_acceleration import lag_m
-from coramp.core.rules import Rules, unpacked
-from coramp.core.slow_phase import least_effort_way, slow_phase
-from coramp.core.trajectory import (
+from coramp.equations.gaps import least_acceleration_mps2
+from coramp.equations.ramp_acceleration import lag_m
+from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
     STATION,
@@ -24,8 +19,12 @@ from coramp.core.trajectory import (
     station_and_speed,
     time_at_station,
 )
+from coramp.motion.approach import change_speed
+from coramp.motion.slow_phase import least_effort_way, slow_phase
+from coramp.road.rules import Rules, unpacked
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.ladder import plan_of
+from coramp.strategies.proposals import find_unsafe_pair, propose_merge
 from coramp.strategies.rungs import Merge, no_merge
 from coramp.strategies.situation import (
     RUNG_DELAY,
@@ -42,6 +41,7 @@ from coramp.strategies.situation import (
 from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
 from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
 from coramp.strategies.slot_pushing import fall_back_behind
+from coramp.vehicles.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
 
 ROOM = 128
 """Vehicles that a plan may change: the subject and those behind it."""

@@ -7,7 +7,12 @@ only after mainline vehicles that cross later than it.
 import math
 
 from coramp._kernel import FloatArray, kernel
-from coramp.core.fleet import (
+from coramp.equations.safe_distance import following_clearance_m
+from coramp.kinematics.trajectory import SPEED
+from coramp.road.rules import Rules
+from coramp.strategies.situation import Situation
+from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, slow_cruise
+from coramp.vehicles.fleet import (
     ROUNDING_M,
     Fleet,
     Proposal,
@@ -17,11 +22,6 @@ from coramp.core.fleet import (
     pair_margin_m,
     trajectory_under,
 )
-from coramp.core.rules import Rules
-from coramp.core.safe_distance import following_clearance_m
-from coramp.core.trajectory import SPEED
-from coramp.strategies.situation import Situation
-from coramp.strategies.slot_in_lane import SLOWEST_SHARE, Manner, slow_cruise
 
 SETBACKS_M = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)
 """How far behind its place a vehicle that falls back is tried."""

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.core.rules import Rules
+from coramp.road.rules import Rules
 from coramp.strategies.base import (
     Decision,
     DriveWithAcceleration,

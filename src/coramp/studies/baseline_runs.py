@@ -4,7 +4,7 @@ from typing import Any
 
 import polars as pl
 
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 from coramp.studies.overrides import overrides_of
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import with_interval

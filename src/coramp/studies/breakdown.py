@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.running import RunSpec
+from coramp.runs.running import RunSpec
 from coramp.studies.definition import Search, Study, spec_of, variants
 
 BREAKDOWN_DELAY_S = 5.0

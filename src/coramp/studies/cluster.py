@@ -7,8 +7,8 @@ from typing import Any
 import joblib as untyped_joblib
 
 from coramp.errors import CorampError
-from coramp.metrics.schemas import RESULT_VERSION
-from coramp.running import versions
+from coramp.records.schemas import RESULT_VERSION
+from coramp.runs.running import versions
 
 joblib: Any = untyped_joblib
 

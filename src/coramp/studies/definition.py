@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from coramp.errors import CorampError
-from coramp.running import DEFAULT_DRIVERS, RunSpec, make_spec
-from coramp.scenario import Flow, Model
+from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
+from coramp.scenarios.model import Flow, Model
+from coramp.scenarios.toml_files import read, validated
 from coramp.strategies.registry import strategy_named
-from coramp.toml_files import read, validated
 
 Flows = Annotated[tuple[Flow, ...], Field(strict=False)]
 FlowPair = Annotated[tuple[Flow, Flow], Field(strict=False)]

@@ -9,9 +9,7 @@ from itertools import pairwise
 import numpy as np
 import polars as pl
 
-from coramp.arrivals import arrivals_of
-from coramp.core.rules import packed
-from coramp.loading import load_scenario
+from coramp.demand.arrivals import arrivals_of
 from coramp.metrics.delay_bound import (
     Arrived,
     earliest_exits_s,
@@ -19,7 +17,9 @@ from coramp.metrics.delay_bound import (
     lane_headway_s,
     mean_delays,
 )
-from coramp.scenario import Scenario
+from coramp.road.rules import packed
+from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.model import Scenario
 from coramp.studies.breakdown import BREAKDOWN_DELAY_S
 from coramp.studies.overrides import overrides_of
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from coramp.metrics.tables import Row
-from coramp.running import RunSpec
+from coramp.records.schemas import Row
+from coramp.runs.running import RunSpec
 from coramp.studies.breakdown import Bisection
 from coramp.studies.store import Store
 

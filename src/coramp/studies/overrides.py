@@ -4,7 +4,7 @@ import ast
 import re
 from typing import Any
 
-from coramp.loading import load_scenario
+from coramp.scenarios.loading import load_scenario
 
 PART = re.compile(r" (?=[a-z][\w.-]*=)")
 

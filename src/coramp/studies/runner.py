@@ -12,8 +12,8 @@ import joblib as untyped_joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from coramp.errors import CorampError
-from coramp.metrics.tables import Row
-from coramp.running import RunSpec, execute, failed_row
+from coramp.records.schemas import Row
+from coramp.runs.running import RunSpec, execute, failed_row
 from coramp.studies.breakdown import Bisection
 from coramp.studies.definition import sort_key
 from coramp.studies.store import Part, Store

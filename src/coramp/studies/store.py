@@ -15,10 +15,9 @@ from typing import Any
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.files import made_folder, read_json, write_json, write_parquet, write_text
-from coramp.metrics.schemas import RESULT_VERSION, RUNS, STREAMS
-from coramp.metrics.tables import Row
-from coramp.running import RunSpec, versions
+from coramp.records.files import made_folder, read_json, write_json, write_parquet, write_text
+from coramp.records.schemas import RESULT_VERSION, RUNS, STREAMS, Row
+from coramp.runs.running import RunSpec, versions
 from coramp.studies.definition import Study
 
 ROWS_AT_A_TIME = 1000

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 import polars as pl
 
-from coramp.running import broken_promises
+from coramp.runs.running import broken_promises
 from coramp.studies.baseline_layout import baseline_tables
 from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study

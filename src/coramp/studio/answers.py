@@ -12,7 +12,7 @@ from coramp.errors import CorampError
 from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
 from coramp.report.page.shown import ShownRun, page_data, played
-from coramp.running import RunSpec
+from coramp.runs.running import RunSpec
 from coramp.studio.dials import NOTHING, Studio
 
 KEPT_RUNS = 16

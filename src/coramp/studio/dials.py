@@ -5,13 +5,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from coramp.core.gaps import least_acceleration_mps2
+from coramp.equations.gaps import least_acceleration_mps2
 from coramp.errors import CorampError
-from coramp.loading import load_scenario
-from coramp.metrics.tables import Row
-from coramp.running import RunSpec, make_spec
-from coramp.scenario import Scenario
-from coramp.scenario_checks import decision_station_range_m
+from coramp.records.schemas import Row
+from coramp.runs.running import RunSpec, make_spec
+from coramp.scenarios.checks import decision_station_range_m
+from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.model import Scenario
 from coramp.strategies.registry import strategies
 
 NOTHING = "nothing"

@@ -2,13 +2,13 @@
 
 import polars as pl
 
-from coramp.planning import PlannedSnapshot
 from coramp.report.page.assemble import rendered
 from coramp.report.page.pages import answer, comparison_table, notes, replay_page
 from coramp.report.page.shown import ShownRun
 from coramp.report.page.study_page import pictures_of
 from coramp.report.page.svg import picture
 from coramp.report.plan_figure import plan_figure
+from coramp.runs.planning import PlannedSnapshot
 from coramp.studies.tables import Table, number
 
 PLAN_COLUMNS = ("vehicle_id", "rung", "merge_time_s", "merge_station_m", "accel_mps2")

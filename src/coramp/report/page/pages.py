@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from coramp.errors import CorampError
-from coramp.metrics.tables import Row
+from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.shown import ShownRun
-from coramp.running import broken_promises
+from coramp.runs.running import broken_promises
 from coramp.studies.tables import Table, number
 
 RUNGS = ("free", "reach", "create", "delay", "hold")

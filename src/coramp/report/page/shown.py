@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from coramp.arrivals import arrivals_of
-from coramp.engines.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
+from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
-from coramp.explanation import quantities
-from coramp.metrics.tables import Row
+from coramp.explain.decision import quantities
+from coramp.explain.story import told
+from coramp.records.schemas import Row
 from coramp.report.style import look_of
-from coramp.running import RunSpec, execute
-from coramp.scenario import Scenario
-from coramp.story import told
+from coramp.runs.running import RunSpec, execute
+from coramp.scenarios.model import Scenario
+from coramp.worlds.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
 
 PIECE_COLUMNS = ("time_s", "station_m", "speed_mps", "accel_mps2")
 DIGITS = (4, 4, 6, 7)

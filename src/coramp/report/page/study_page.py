@@ -6,9 +6,9 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.files import read_json
-from coramp.metrics.schemas import RESULT_VERSION
-from coramp.metrics.tables import Row
+from coramp.records.files import read_json
+from coramp.records.run_folder import check_version
+from coramp.records.schemas import RESULT_VERSION, Row
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -20,8 +20,7 @@ from coramp.report.page.shown import ShownRun, played
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.style import look_of
-from coramp.run_folder import check_version
-from coramp.running import make_spec
+from coramp.runs.running import make_spec
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.statistics import estimate
 from coramp.studies.store import MARK, Store

@@ -5,7 +5,7 @@ import io
 
 from matplotlib.figure import Figure
 
-from coramp.metrics.tables import Row
+from coramp.records.schemas import Row
 from coramp.report.style import UNDATED
 
 

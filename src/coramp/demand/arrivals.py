@@ -1,0 +1,135 @@
+"""Who arrives when: random headways and entry speeds, the same for every strategy."""
+
+import math
+import zlib
+from itertools import count
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.coordination.plant import STREAMS, Arrival
+from coramp.scenarios.model import Mainline, Ramp, Scenario
+
+
+def generator(seed: int, purpose: str) -> np.random.Generator:
+    """Returns the random generator of one purpose; another purpose never shifts it."""
+    return np.random.default_rng(
+        np.random.SeedSequence(seed, spawn_key=(zlib.crc32(purpose.encode()),))
+    )
+
+
+def arrival_times_s(
+    flow_veh_h: float,
+    min_headway_s: float,
+    horizon_s: float,
+    step_s: float,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Returns times (s) on the step grid within [0, horizon), headways shifted exponential.
+
+    A headway is ``min_headway`` plus an exponential one whose mean makes up the flow. Times are
+    rounded up to the grid, so headways keep their minimum if that is a multiple of the step.
+    """
+    if flow_veh_h == 0.0:
+        return np.empty(0)
+    mean_extra_s = 3600.0 / flow_veh_h - min_headway_s
+    expected = int(flow_veh_h * horizon_s / 3600.0)
+    times_s = np.empty(0)
+    last_s = 0.0
+    while last_s < horizon_s:
+        headways_s = min_headway_s + random.exponential(mean_extra_s, expected // 4 + 64)
+        times_s = np.concatenate([times_s, last_s + np.cumsum(headways_s)])
+        last_s = times_s[-1]
+    steps = np.ceil(times_s / step_s - 1e-9)
+    return np.asarray(steps[steps * step_s < horizon_s - 1e-9] * step_s)
+
+
+def changing_arrival_times_s(
+    flows_veh_h: tuple[float, float],
+    min_headway_s: float,
+    horizon_s: float,
+    step_s: float,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Returns times (s) as ``arrival_times_s`` does, of a flow that changes evenly.
+
+    It goes from the first of ``flows_veh_h`` at 0 to the second at the horizon. Once the least
+    headway h has passed, the chance of an arrival is lambda = 1 / (3600 / q - h) in each second, q
+    being the flow of that moment: with a constant q these are the headways of ``arrival_times_s``.
+    A draw e of the unit exponential distribution is the integral of lambda up to the arrival.
+    """
+    at_s = np.arange(math.ceil(horizon_s / step_s) + 2) * step_s
+    middle = np.minimum(1.0, (at_s[:-1] + 0.5 * step_s) / horizon_s)
+    flow_veh_h = flows_veh_h[0] + (flows_veh_h[1] - flows_veh_h[0]) * middle
+    rate_ps = flow_veh_h / (3600.0 - flow_veh_h * min_headway_s)
+    integral = np.concatenate([[0.0], np.cumsum(rate_ps * step_s)])
+    times_s = []
+    last_s = 0.0
+    while last_s + min_headway_s < at_s[-1]:
+        due = np.interp(last_s + min_headway_s, at_s, integral) + random.exponential()
+        if due >= integral[-1]:
+            break
+        last_s = float(np.interp(due, integral, at_s))
+        times_s.append(last_s)
+    steps = np.ceil(np.array(times_s) / step_s - 1e-9)
+    return np.asarray(steps[steps * step_s < horizon_s - 1e-9] * step_s)
+
+
+def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
+    """Returns all arrivals of a run, by time, the mainline's first where two coincide.
+
+    Vehicles are named by scheduled time: m00001, r00001 and so on.
+    """
+    if scenario.arrivals:
+        given = _explicit_arrivals(scenario)
+    else:
+        given = [
+            *_stream_arrivals(scenario, False, scenario.mainline, seed),
+            *_stream_arrivals(scenario, True, scenario.ramp, seed),
+        ]
+    numbers = (count(1), count(1))
+    return [
+        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, speed_mps, length_m)
+        for step, on_ramp, speed_mps, length_m in sorted(given)
+    ]
+
+
+def _name(on_ramp: bool, number: int) -> str:
+    return f"{'r' if on_ramp else 'm'}{number:05d}"
+
+
+Unnamed = tuple[int, bool, float, float]
+"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m)."""
+
+
+def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
+    return [
+        (
+            round(arrival.time_s / scenario.control.step_s),
+            arrival.stream == "ramp",
+            arrival.speed_mps,
+            arrival.length_m or scenario.vehicle.length_m,
+        )
+        for arrival in scenario.arrivals
+    ]
+
+
+def _stream_arrivals(
+    scenario: Scenario, on_ramp: bool, stream: Mainline | Ramp, seed: int
+) -> list[Unnamed]:
+    name, step_s = STREAMS[on_ramp], scenario.control.step_s
+    clock = stream.min_headway_s, scenario.simulation.horizon_s, step_s
+    random = generator(seed, f"arrivals/{name}")
+    if stream.flow_to_veh_h is None:
+        times_s = arrival_times_s(stream.flow_veh_h, *clock, random)
+    else:
+        flows_veh_h = stream.flow_veh_h, stream.flow_to_veh_h
+        times_s = changing_arrival_times_s(flows_veh_h, *clock, random)
+    low_mps, high_mps = stream.entry_speed_mps
+    speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
+    steps = np.rint(times_s / step_s).astype(np.int64)
+    length_m = scenario.vehicle.length_m
+    return [
+        (step, on_ramp, speed_mps, length_m)
+        for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
+    ]

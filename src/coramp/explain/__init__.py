@@ -1,0 +1,1 @@
+"""Why a vehicle was planned as it was."""

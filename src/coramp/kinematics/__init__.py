@@ -1,0 +1,1 @@
+"""Trajectories of constant acceleration, and what is exact about them; fuel."""

@@ -1,0 +1,1 @@
+"""How one vehicle may move: to the speed of its lane, to a stop, behind a slower one."""

@@ -1,0 +1,74 @@
+"""What a run leaves behind in memory: who passed, how they drove, what was decided."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.coordination.coordinator import DecisionRecord, Refusal
+
+LANES = ("ramp", "acceleration", "mainline")
+"""Names of the lane codes of ``coordination.driven``."""
+
+
+@dataclass(frozen=True)
+class Passages:
+    """One entry a vehicle, in the order of scheduled times; nan where something never happened.
+
+    ``merge_s`` is when a ramp vehicle changed to the mainline, minus infinity for mainline
+    vehicles. ``entry_speed_mps`` is the scheduled one. ``plan_error_m`` is the largest distance
+    seen between plan and simulator, nan without a plan.
+    """
+
+    vehicle_id: tuple[str, ...]
+    on_ramp: BoolArray
+    length_m: FloatArray
+    scheduled_s: FloatArray
+    entry_speed_mps: FloatArray
+    entry_s: FloatArray
+    merge_s: FloatArray
+    exit_s: FloatArray
+    plan_error_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.vehicle_id)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """How all vehicles drive: pieces of shape (n, 4) as in ``kinematics.trajectory``.
+
+    ``first`` has one entry a vehicle of the passages and one more: vehicle i's rows are first[i]
+    to first[i + 1].
+    """
+
+    first: IntArray
+    rows: FloatArray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything that an engine hands to the metrics.
+
+    ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
+    simulator made of it; for its own drivers both are its steps. ``end_s`` is when the run ended or
+    was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
+    places in ``passages``.
+    """
+
+    cooperative: bool
+    passages: Passages
+    pieces: Pieces
+    lane: IntArray
+    driven: Pieces
+    end_s: float
+    collisions: int
+    decisions: tuple[DecisionRecord, ...] = ()
+    refusals: tuple[Refusal, ...] = ()
+    interventions: int = 0
+    vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+
+    @property
+    def until_s(self) -> FloatArray:
+        """When each vehicle left, or the run ended without it."""
+        return np.where(np.isnan(self.passages.exit_s), self.end_s, self.passages.exit_s)

@@ -1,0 +1,169 @@
+"""The columns of all result files, in one place."""
+
+from typing import Any
+
+import polars as pl
+
+Row = dict[str, Any]
+"""One row of a table, by column."""
+Schema = dict[str, type[pl.DataType] | pl.DataType]
+
+RESULT_VERSION = 4
+"""Raised whenever the same specification gives other numbers or other columns."""
+
+VEHICLES: Schema = {
+    "vehicle_id": pl.String,
+    "stream": pl.String,
+    "scheduled_s": pl.Float64,
+    "entry_s": pl.Float64,
+    "exit_s": pl.Float64,
+    "waiting_s": pl.Float64,
+    "travel_s": pl.Float64,
+    "free_flow_s": pl.Float64,
+    "delay_s": pl.Float64,
+    "mean_speed_mps": pl.Float64,
+    "fuel_l": pl.Float64,
+    "finished": pl.Boolean,
+    "plan_error_m": pl.Float64,
+}
+
+TRAJECTORIES: Schema = {
+    "vehicle_id": pl.String,
+    "lane": pl.String,
+    "time_s": pl.Float64,
+    "station_m": pl.Float64,
+    "speed_mps": pl.Float64,
+    "accel_mps2": pl.Float64,
+}
+
+DECISIONS: Schema = {
+    "time_s": pl.Float64,
+    "vehicle_id": pl.String,
+    "rung": pl.String,
+    "scenario": pl.Int64,
+    "conflict_vehicle_id": pl.String,
+    "severity_before": pl.Float64,
+    "severity_after": pl.Float64,
+    "front_vehicle_id": pl.String,
+    "rear_vehicle_id": pl.String,
+    "gap_m": pl.Float64,
+    "required_gap_m": pl.Float64,
+    "accel_mps2": pl.Float64,
+    "merge_time_s": pl.Float64,
+    "merge_station_m": pl.Float64,
+    "adjusted_vehicle_ids": pl.List(pl.String),
+    "largest_shift_m": pl.Float64,
+    "min_margin_m": pl.Float64,
+    "relative_severity_before": pl.Float64,
+    "relative_severity_after": pl.Float64,
+    "nose_time_s": pl.Float64,
+    "nose_speed_mps": pl.Float64,
+    "conflict_station_m": pl.Float64,
+    "front_station_m": pl.Float64,
+    "rear_station_m": pl.Float64,
+}
+
+VIOLATIONS: Schema = {
+    "time_s": pl.Float64,
+    "front_vehicle_id": pl.String,
+    "rear_vehicle_id": pl.String,
+    "margin_m": pl.Float64,
+}
+
+SPEEDS: Schema = {
+    "stream": pl.String,
+    "time_s": pl.Float64,
+    "mean_speed_mps": pl.Float64,
+    "vehicles": pl.Int64,
+}
+
+RUN_KEYS: Schema = {
+    "scenario": pl.String,
+    "drivers": pl.String,
+    "strategy": pl.String,
+    "engine": pl.String,
+    "mainline_veh_h": pl.Float64,
+    "ramp_veh_h": pl.Float64,
+    "seed": pl.Int64,
+}
+"""What runs are sorted by."""
+
+_FIRST_METRICS: Schema = {
+    "vehicles_mainline": pl.Int64,
+    "vehicles_ramp": pl.Int64,
+    "unserved": pl.Int64,
+    "mainline_delay_s": pl.Float64,
+    "ramp_delay_s": pl.Float64,
+    "mainline_delay_p95_s": pl.Float64,
+    "ramp_delay_p95_s": pl.Float64,
+    "mainline_speed_mps": pl.Float64,
+    "ramp_speed_mps": pl.Float64,
+    "mainline_speed_std_mps": pl.Float64,
+    "ramp_speed_std_mps": pl.Float64,
+    "fuel_l": pl.Float64,
+    "collisions": pl.Int64,
+    "safety_violations": pl.Int64,
+    "min_margin_m": pl.Float64,
+    "min_ttc_s": pl.Float64,
+    "max_drac_mps2": pl.Float64,
+    "max_severity": pl.Float64,
+    "max_decel_mps2": pl.Float64,
+    "plan_error_m": pl.Float64,
+    "adjusted_vehicles": pl.Int64,
+    "rung_free": pl.Int64,
+    "rung_reach": pl.Int64,
+    "rung_create": pl.Int64,
+    "rung_delay": pl.Int64,
+    "rung_hold": pl.Int64,
+    "refused_plans": pl.Int64,
+    "interventions": pl.Int64,
+    "max_jerk_mps3": pl.Float64,
+}
+
+_LATER_METRICS: Schema = {
+    "delay_s": pl.Float64,
+    "delay_bound_s": pl.Float64,
+    "delay_bound_ratio": pl.Float64,
+    "mainline_fcfs_delay_s": pl.Float64,
+    "ramp_fcfs_delay_s": pl.Float64,
+    "lane_limit_veh_h": pl.Float64,
+    "hard_brakings_3": pl.Int64,
+    "hard_brakings_4_5": pl.Int64,
+    "stops": pl.Int64,
+    "breakdown_time_s": pl.Float64,
+    "prebreakdown_flow_veh_h": pl.Float64,
+    "discharge_flow_veh_h": pl.Float64,
+}
+"""They stand at the end of ``runs.parquet``, so that what was there keeps its place."""
+
+RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS}
+
+RUNS: Schema = {
+    "run_id": pl.String,
+    **RUN_KEYS,
+    "overrides": pl.String,
+    "status": pl.String,
+    "error": pl.String,
+    **_FIRST_METRICS,
+    "wall_s": pl.Float64,
+    "planning_median_s": pl.Float64,
+    "planning_p95_s": pl.Float64,
+    **_LATER_METRICS,
+}
+PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
+MEASURED = ("wall_s", *PLANNING_TIMES)
+"""Columns that hold wall times: all that differs between equal runs."""
+
+STREAMS: Schema = {
+    "run_id": pl.String,
+    "stream": pl.String,
+    "flow_veh_h": pl.Float64,
+    "vehicles": pl.Int64,
+    "unserved": pl.Int64,
+    "delay_s": pl.Float64,
+    "delay_p95_s": pl.Float64,
+    "waiting_s": pl.Float64,
+    "speed_mps": pl.Float64,
+    "speed_std_mps": pl.Float64,
+    "fuel_l": pl.Float64,
+}

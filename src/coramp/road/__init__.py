@@ -1,0 +1,1 @@
+"""The road, and what is allowed on it."""

@@ -1,0 +1,1 @@
+"""One run or one decision, from its specification to its tables."""

@@ -1,0 +1,43 @@
+"""What can be said of a run before it: whether more arrive than the lane carries."""
+
+from collections.abc import Sequence
+
+from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
+from coramp.runs.running import RunSpec
+from coramp.scenarios.model import Safety
+
+
+def demand_above_limit(spec: RunSpec) -> str | None:
+    """Returns in a line that a cooperative run's flows are above its lane's limit, else None.
+
+    Arrivals that are listed one by one have no flow. Of flows that change the most counts.
+    """
+    scenario = spec.scenario
+    if spec.drivers is not None or scenario.arrivals:
+        return None
+    streams = (scenario.mainline.flows_veh_h, scenario.ramp.flows_veh_h)
+    demand_veh_h = max(map(sum, zip(*streams, strict=True)))
+    limit_veh_h = lane_limit_veh_h(lane_headway_s(scenario.vehicle.length_m, scenario.rules()))
+    if demand_veh_h <= limit_veh_h:
+        return None
+    return (
+        f"{demand_veh_h:,.0f} veh/h is above this lane's {limit_veh_h:,.0f}"
+        f"{_gaps(scenario.safety)}: queues will grow"
+    )
+
+
+def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
+    """Returns in a line how many of a study's runs have flows above their lane's limit, or None."""
+    told = [line for spec in specs if (line := demand_above_limit(spec)) is not None]
+    if not told:
+        return None
+    return f"{len(told)} of {len(specs)} runs are above what their lane carries; such as {told[0]}"
+
+
+def _gaps(safety: Safety) -> str:
+    gaps = (
+        ("time gap", safety.time_gap_s, "s"),
+        ("standstill gap", safety.standstill_gap_m, "m"),
+    )
+    kept = ", ".join(f"{name} {gap:g} {unit}" for name, gap, unit in gaps if gap)
+    return f" ({kept})" if kept else ""

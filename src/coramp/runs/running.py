@@ -1,0 +1,246 @@
+"""One run, from its specification to its tables."""
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from coramp.coordination.guard import strategy_to_run
+from coramp.coordination.timed import Timed
+from coramp.errors import CorampError
+from coramp.metrics.tables import RunTables, tables_of
+from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
+from coramp.scenarios.loading import drivers_checked, load_scenario
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.toml_files import key_parts
+from coramp.strategies.base import is_metered
+from coramp.strategies.registry import strategy_named
+from coramp.worlds.exact.engine import run_exact
+from coramp.worlds.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
+
+ENGINES = ("sumo", "exact")
+DEFAULT_DRIVERS = "fair"
+LARGEST_PLAN_ERROR_M = 0.05
+FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
+OPTIONS = {
+    "mainline.flow_veh_h": "--mainline",
+    "ramp.flow_veh_h": "--ramp",
+    "simulation.horizon_s": "--horizon",
+}
+"""Options of the command line that stand for keys of a scenario."""
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """Everything that determines a run. ``overrides`` are what was set beside the flows."""
+
+    scenario: Scenario
+    strategy: str
+    engine: str
+    drivers: str | None
+    seed: int
+    overrides: tuple[tuple[str, Any], ...] = ()
+
+    @cached_property
+    def run_id(self) -> str:
+        """A hash of the whole specification and of the version of results."""
+        content = [
+            RESULT_VERSION,
+            metadata.version("libsumo"),
+            self.scenario.model_dump(mode="json"),
+            self.strategy,
+            self.engine,
+            self.drivers,
+            self.seed,
+        ]
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def keys(self) -> Row:
+        """The columns that runs are sorted by, and the overrides."""
+        return {
+            "scenario": self.scenario.name,
+            "drivers": self.drivers,
+            "strategy": self.strategy,
+            "engine": self.engine,
+            "mainline_veh_h": float(self.scenario.mainline.flow_veh_h),
+            "ramp_veh_h": float(self.scenario.ramp.flow_veh_h),
+            "seed": self.seed,
+            "overrides": " ".join(f"{key}={value}" for key, value in self.overrides) or None,
+        }
+
+    def as_data(self) -> Row:
+        """Returns the specification as plain data."""
+        content = self.scenario.model_dump(mode="json")
+        return {"run_id": self.run_id, **self.keys, "specification": content}
+
+
+def make_spec(
+    scenario: str,
+    strategy: str = "mainline-priority",
+    *,
+    engine: str = "sumo",
+    mainline_veh_h: float | None = None,
+    ramp_veh_h: float | None = None,
+    drivers: str | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    horizon_s: float | None = None,
+    blamed: str | None = None,
+) -> RunSpec:
+    """Returns the specification of a run; raises CorampError for what cannot be run.
+
+    Errors name the options of the command line, or else say ``blamed`` for all of them.
+    """
+    chosen = strategy_named(strategy)
+    engine_checked(engine)
+    if engine == "exact" and not chosen.cooperative:
+        raise CorampError(
+            f"engine: exact has no drivers for {strategy}; choose sumo, or a cooperative strategy"
+        )
+    if not isinstance(seed, int) or not 0 <= seed < 2**31:
+        raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
+    others, values = dict(overrides or {}), (mainline_veh_h, ramp_veh_h, horizon_s)
+    named = {key: v for key, v in zip(OPTIONS, values, strict=True) if v is not None}
+    if twice := sorted(named.keys() & others.keys()):
+        options = ", ".join(f"{key} by {OPTIONS[key]} and by --set" for key in twice)
+        raise CorampError(f"{blamed or '--set'}: {options}: given twice; allowed is once")
+    blame = {**dict.fromkeys(others, "--set"), **{key: OPTIONS[key] for key in named}}
+    if blamed is not None:
+        blame = dict.fromkeys(blame, blamed)
+    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    if is_metered(chosen) and loaded.signal_problem:
+        raise CorampError(loaded.signal_problem)
+    population = None
+    if drivers is not None or not chosen.cooperative:
+        population = drivers_checked(loaded, drivers or DEFAULT_DRIVERS)
+    if chosen.cooperative:
+        population = None
+    return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def engine_checked(engine: str) -> str:
+    """Returns the name of an engine; raises CorampError if there is none such."""
+    if engine not in ENGINES:
+        raise CorampError(f"engine: there is no {engine!r}; allowed are {', '.join(ENGINES)}")
+    return engine
+
+
+def _as_floats(named: Mapping[str, Any]) -> dict[str, Any]:
+    """Whole numbers as floats; what is no number is left to the scenario's checks."""
+    return {key: float(v) if isinstance(v, int | float) else v for key, v in named.items()}
+
+
+def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """Returns what was set beside the flows and differs from the scenario as it is."""
+    others = {key: value for key, value in settings.items() if key not in FLOW_KEYS}
+    if not others:
+        return ()
+    try:
+        plain = load_scenario(scenario).model_dump(mode="json")
+    except CorampError:  # valid only with its overrides
+        return tuple(sorted(others.items()))
+    return tuple(sorted((k, v) for k, v in others.items() if _looked_up(plain, k) != v))
+
+
+def _looked_up(data: Any, dotted: str) -> Any:
+    for part in key_parts(data, dotted):
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
+
+
+def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTables, Row]:
+    """Returns the tables of a run and its row of ``runs.parquet``.
+
+    Raises CorampError where the run fails.
+    """
+    options = options or SumoOptions()
+    started = time.perf_counter()
+    name = spec.strategy
+    strategy = Timed(strategy_to_run(name, spec.scenario.strategy.get(name)))
+    if spec.engine == "exact":
+        outcome = run_exact(spec.scenario, strategy, spec.seed)
+    elif strategy_named(name).cooperative:
+        outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
+    else:
+        drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
+        outcome = run_uncontrolled(spec.scenario, strategy, drivers, spec.seed, options)
+    tables = tables_of(outcome, spec.scenario)
+    row = {
+        "run_id": spec.run_id,
+        **spec.keys,
+        "status": "ok",
+        "error": None,
+        **tables.metrics,
+        "wall_s": time.perf_counter() - started,
+        **dict(zip(PLANNING_TIMES, strategy.planning_times_s(), strict=True)),
+    }
+    return tables, row
+
+
+def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
+    """Returns the row of a run that failed."""
+    nothing = dict.fromkeys(RUN_METRICS)
+    return {
+        "run_id": spec.run_id,
+        **spec.keys,
+        "status": "failed",
+        "error": error,
+        **nothing,
+        "wall_s": wall_s,
+        **dict.fromkeys(PLANNING_TIMES),
+    }
+
+
+def broken_promises(row: Mapping[str, Any]) -> list[str]:
+    """Returns in words what a cooperative run promised and did not keep; nothing for others."""
+    if row["status"] != "ok" or row["drivers"] is not None:
+        return []
+    broken = []
+    if row["collisions"]:
+        broken.append(f"{row['collisions']} collisions in SUMO")
+    if row["safety_violations"]:
+        broken.append(f"{row['safety_violations']} pairs nearer than the safe distance")
+    if row["plan_error_m"] is not None and row["plan_error_m"] > LARGEST_PLAN_ERROR_M:
+        broken.append(f"driven {row['plan_error_m']:.3f} m off plan")
+    return broken
+
+
+def run_content(spec: RunSpec, row: Row) -> Row:
+    """Returns what ``run.json`` holds and ``coramp run --json`` prints."""
+    content = {
+        "kind": "run",
+        "result_version": RESULT_VERSION,
+        **spec.as_data(),
+        "versions": versions(),
+        "summary": row,
+    }
+    return {key: finite_or_none(value) for key, value in content.items()}
+
+
+def versions() -> dict[str, str]:
+    """Returns the versions that a result depends on."""
+    import platform
+
+    names = ("coramp", "libsumo", "eclipse-sumo", "numpy", "numba", "polars")
+    return {**{name: metadata.version(name) for name in names}, "python": platform.python_version()}
+
+
+def finite_or_none(value: Any) -> Any:
+    """Returns plain data in which numbers that JSON has no word for are None."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: finite_or_none(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_or_none(inner) for inner in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value

@@ -1,0 +1,1 @@
+"""Scenarios: a road, its vehicles, its traffic and its controller, as validated files."""

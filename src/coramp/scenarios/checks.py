@@ -1,0 +1,260 @@
+"""What must fit together in a scenario whose values are sensible each by itself."""
+
+import math
+from typing import TYPE_CHECKING
+
+from coramp.equations.gaps import least_acceleration_mps2
+from coramp.equations.ramp_acceleration import lag_m
+from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
+from coramp.errors import CorampError
+from coramp.strategies.parameters import wrong_settings, wrong_together
+from coramp.strategies.registry import strategy_named
+
+if TYPE_CHECKING:
+    from coramp.scenarios.model import Scenario
+
+SHORTEST_EDGE_M = 1.0
+"""What SUMO can still build behind the acceleration lane."""
+
+
+def problems_of(scenario: "Scenario") -> list[str]:
+    """Returns a line ``key: what is wrong; what is allowed`` for all that does not fit."""
+    problems = [*_speed_problems(scenario), *_place_problems(scenario), *_flow_problems(scenario)]
+    problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
+    problems += _driver_problems(scenario)
+    return problems or _planning_problems(scenario)
+
+
+def _speed_problems(scenario: "Scenario") -> list[str]:
+    mainline, ramp = scenario.mainline, scenario.ramp
+    problems = []
+    if ramp.speed_mps >= mainline.speed_mps:
+        problems.append(
+            f"ramp.speed_mps: {ramp.speed_mps:g} is not below mainline.speed_mps; "
+            f"the method needs a ramp slower than {mainline.speed_mps:g} m/s"
+        )
+    for name, stream in (("mainline", mainline), ("ramp", ramp)):
+        low, high = stream.entry_speed_mps
+        if low > high:
+            problems.append(
+                f"{name}.entry_speed_mps: [{low:g}, {high:g}] falls; write the lower speed first"
+            )
+        for key, value in (("speed_mps", stream.speed_mps), ("entry_speed_mps", high)):
+            if value > stream.limit_mps:
+                problems.append(
+                    f"{name}.{key}: {value:g} is above {name}.limit_mps; "
+                    f"allowed is up to {stream.limit_mps:g} m/s"
+                )
+    return problems
+
+
+def _place_problems(scenario: "Scenario") -> list[str]:
+    mainline, ramp = scenario.mainline, scenario.ramp
+    problems = []
+    if mainline.end_m < ramp.acceleration_lane_m + SHORTEST_EDGE_M:
+        problems.append(
+            f"mainline.end_m: {mainline.end_m:g} is not far enough beyond the acceleration lane; "
+            f"allowed is at least {ramp.acceleration_lane_m + SHORTEST_EDGE_M:g} m"
+        )
+    if not scenario.detector_station_m <= ramp.acceleration_lane_m:
+        problems.append(
+            f"ramp.detector_station_m: {scenario.detector_station_m:g} is not beside the "
+            f"acceleration lane; allowed is up to {ramp.acceleration_lane_m:g} m"
+        )
+    if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
+        problems.append(
+            f"ramp.decision_station_m: {ramp.decision_station_m:g} is not on the ramp before the "
+            f"stop; allowed is between {ramp.start_m:g} and {scenario.stop_station_m:g} m"
+        )
+    if scenario.stop_station_m > -scenario.run_up_m:
+        problems.append(
+            f"ramp.stop_station_m: {scenario.stop_station_m:g} is too near to the nose to reach v0 "
+            f"from a stand; allowed is up to {-scenario.run_up_m:g} m"
+        )
+    return problems
+
+
+def _flow_problems(scenario: "Scenario") -> list[str]:
+    problems = []
+    for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
+        most = 3600.0 / stream.min_headway_s
+        flows = (("flow_veh_h", stream.flow_veh_h), ("flow_to_veh_h", stream.flow_to_veh_h))
+        problems += [
+            f"{name}.{key}: {flow:g} cannot arrive with headways of "
+            f"{stream.min_headway_s:g} s or more; allowed is below {most:g} veh/h"
+            for key, flow in flows
+            if flow is not None and flow >= most
+        ]
+    last_s: dict[str, float] = {}
+    for number, arrival in enumerate(scenario.arrivals):
+        key = f"arrivals.{number}"
+        limit = getattr(scenario, arrival.stream).limit_mps
+        if arrival.speed_mps > limit:
+            problems.append(
+                f"{key}.speed_mps: {arrival.speed_mps:g} is above {arrival.stream}.limit_mps; "
+                f"allowed is up to {limit:g} m/s"
+            )
+        if arrival.time_s <= last_s.get(arrival.stream, -1.0):
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} does not come after the one before it on the "
+                f"{arrival.stream}; allowed is above {last_s[arrival.stream]:g} s"
+            )
+        if arrival.time_s > scenario.simulation.horizon_s:
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} lies beyond simulation.horizon_s; "
+                f"allowed is up to {scenario.simulation.horizon_s:g} s"
+            )
+        if not is_multiple(arrival.time_s, scenario.control.step_s):
+            problems.append(
+                f"{key}.time_s: {arrival.time_s:g} is not on the step grid; "
+                f"allowed are multiples of {scenario.control.step_s:g} s"
+            )
+        last_s[arrival.stream] = arrival.time_s
+    return problems
+
+
+def is_multiple(value: float, unit: float) -> bool:
+    """Returns whether ``value`` is a whole multiple of ``unit``, but for rounding."""
+    return abs(value / unit - round(value / unit)) < 1e-6
+
+
+def _clock_problems(scenario: "Scenario") -> list[str]:
+    control = scenario.control
+    problems = []
+    if not is_multiple(control.actuation_delay_s, control.step_s):
+        problems.append(
+            f"control.actuation_delay_s: {control.actuation_delay_s:g} is not on the control "
+            f"clock; allowed are multiples of {control.step_s:g} s"
+        )
+    if not is_multiple(1000.0 * control.step_s, 1.0):
+        problems.append(
+            f"control.step_s: {control.step_s:g} is not what SUMO can step; "
+            "allowed are whole milliseconds"
+        )
+    return problems
+
+
+def _strategy_problems(scenario: "Scenario") -> list[str]:
+    problems: list[str] = []
+    for name, settings in scenario.strategy.items():
+        try:
+            found = strategy_named(name)
+        except CorampError as error:
+            problems += error.messages
+            continue
+        wrong = wrong_settings(found, settings) or wrong_together(found, settings)
+        problems += [f"strategy.{name}.{line}" for line in wrong]
+    return problems
+
+
+def _driver_problems(scenario: "Scenario") -> list[str]:
+    """A speed factor must hold its mean, and needs a common speed to be a factor of."""
+    problems = []
+    for name, drivers in scenario.drivers.items():
+        key, factor = f"drivers.{name}.speed_factor", drivers.speed_factor
+        if factor is None:
+            continue
+        if drivers.wish != "free-flow":
+            problems.append(
+                f"{key}: each wishes the speed that it entered with; "
+                f'allowed with drivers.{name}.wish "free-flow" alone'
+            )
+        if not factor.low <= factor.mean <= factor.high:
+            problems.append(
+                f"{key}: {factor.mean:g} is not between low and high; "
+                f"allowed are low <= mean <= high"
+            )
+    return problems
+
+
+def _planning_problems(scenario: "Scenario") -> list[str]:
+    """What only shows once all values are sensible by themselves: can a merge be planned at all?"""
+    mainline, ramp, motion = scenario.mainline, scenario.ramp, scenario.motion
+    v0, ramp_mps = mainline.speed_mps, ramp.speed_mps
+    usable_m, lane_m = scenario.last_merge_station_m, ramp.acceleration_lane_m
+    key = "ramp.acceleration_lane_m"
+    if usable_m <= 0.0:
+        need_m = lane_m - usable_m
+        return [f"{key}: {lane_m:g} is too short to merge in; allowed is above {need_m:g} m"]
+    least = least_acceleration_mps2(v0, ramp_mps, usable_m)
+    if least > motion.ramp_acceleration_mps2:
+        need_m = least * usable_m / motion.ramp_acceleration_mps2 + lane_m - usable_m
+        asked = f"Eq. 22 asks for {least:.2f} m/s2, more than motion.ramp_acceleration_mps2"
+        return [f"{key}: {lane_m:g} is too short: {asked}; allowed is above {need_m:.1f} m"]
+    problems = []
+    if not least <= motion.free_acceleration_mps2 <= motion.ramp_acceleration_mps2:
+        problems.append(
+            f"motion.free_acceleration_mps2: {motion.free_acceleration_mps2:g} is outside Eq. 22; "
+            f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
+        )
+    first, last = decision_station_range_m(scenario)
+    if gaps := _gap_problems(scenario, first, last):
+        problems += gaps
+    elif first > last:
+        problems.append(
+            "ramp.decision_station_m: there is none at which all that matter have entered "
+            f"({first:.1f} m or later) and it can still stop ({last:.1f} m or earlier); "
+            "allowed are an earlier mainline.start_m, a shorter acceleration lane, harder braking"
+        )
+    elif not first <= ramp.decision_station_m <= last:
+        problems.append(
+            f"ramp.decision_station_m: at {ramp.decision_station_m:g} m not every vehicle that "
+            "matters has entered, or it is too late to stop; "
+            f"allowed is {first:.1f} to {last:.1f} m"
+        )
+    return problems
+
+
+def _gap_problems(scenario: "Scenario", first_m: float, last_m: float) -> list[str]:
+    """What is wrong with the gaps, if it is they that leave the decision station too early.
+
+    A vehicle that enters as another is planned must find room behind that one's merge. Where the
+    clearance fits there, everyone is served in the end, however long the queue.
+    """
+    road, safety = scenario.rules().road, scenario.rules().safety
+    v0, station_m = road.mainline_speed_mps, road.decision_station_m
+    short_m = (first_m - station_m) * v0 / road.ramp_speed_mps
+    bare = safety._replace(time_gap_s=0.0, standstill_gap_m=0.0)
+    most_clearance_m = merge_clearance_m(road, safety) - short_m
+    if short_m <= 0.0 or station_m > last_m or most_clearance_m < merge_clearance_m(road, bare):
+        return []
+    room_m = most_clearance_m - following_clearance_m(road, bare)
+    gaps_m = {"time_gap_s": safety.time_gap_s * v0, "standstill_gap_m": safety.standstill_gap_m}
+    larger, smaller = sorted(gaps_m, key=lambda name: -gaps_m[name])
+    allowed_m = {larger: max(0.0, room_m - gaps_m[smaller])}
+    if gaps_m[smaller] > room_m:
+        allowed_m[smaller] = room_m
+    return [_too_long(scenario, name, most_m) for name, most_m in allowed_m.items()]
+
+
+def _too_long(scenario: "Scenario", name: str, most_m: float) -> str:
+    unit, most = "m", most_m
+    if name == "time_gap_s":
+        unit, most = "s", most_m / scenario.mainline.speed_mps
+    return (
+        f"safety.{name}: {getattr(scenario.safety, name):g} {unit} does not fit on the mainline "
+        f"from {scenario.mainline.start_m:g} m to the merge of a vehicle that is planned at "
+        f"ramp.decision_station_m; allowed is up to {math.floor(1000.0 * most) / 1000.0:g} {unit}"
+    )
+
+
+def decision_station_range_m(scenario: "Scenario") -> tuple[float, float]:
+    """Returns the first and last station (m) at which a ramp vehicle may be planned.
+
+    The first: a mainline vehicle that enters just then must come behind the subject even if this
+    merges with the least acceleration. The last: from there it can still stop before the nose.
+    """
+    road, safety = scenario.rules().road, scenario.rules().safety
+    v0, ramp_mps = road.mainline_speed_mps, road.ramp_speed_mps
+    control = scenario.control
+    least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
+    behind_m = (
+        lag_m(v0, ramp_mps, least)
+        + scenario.vehicle.length_m
+        + merge_clearance_m(road, safety)
+        + v0 * control.step_s
+    )
+    first_m = (road.mainline_start_m + behind_m) * ramp_mps / v0
+    stop_m = 0.5 * road.ramp_limit_mps**2 / scenario.stop_mps2
+    reaction_m = road.ramp_limit_mps * (control.actuation_delay_s + control.step_s)
+    return max(first_m, road.ramp_start_m), road.stop_station_m - stop_m - reaction_m

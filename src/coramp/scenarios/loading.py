@@ -1,0 +1,39 @@
+"""From a name or a file, with overrides, to a validated scenario."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from coramp.errors import CorampError
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
+
+
+def load_scenario(
+    name: str,
+    overrides: Mapping[str, Any] | None = None,
+    origins: Mapping[str, str] | None = None,
+) -> Scenario:
+    """Returns the built-in scenario of that name, or that of a file, with dotted keys overridden.
+
+    ``origins`` says what to blame for an overridden key, else it is ``--set``. Raises CorampError
+    with a message for each thing that is wrong.
+    """
+    label, data = read("scenarios", name)
+    overrides = overrides or {}
+    blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
+    return validated(Scenario, with_overrides(data, overrides, blamed), label, blamed)
+
+
+def builtin_scenarios() -> list[Scenario]:
+    """Returns the scenarios that come with coramp."""
+    return [load_scenario(name) for name in builtin_names("scenarios")]
+
+
+def drivers_checked(scenario: Scenario, drivers: str) -> str:
+    """Returns the name of a driver population; raises CorampError if the scenario has none such."""
+    if drivers not in scenario.drivers:
+        known = ", ".join(scenario.drivers) or "none: the scenario has no [drivers.NAME] table"
+        raise CorampError(
+            f"drivers: there is no {drivers!r} in {scenario.name}; allowed are {known}"
+        )
+    return drivers

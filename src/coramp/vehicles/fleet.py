@@ -1,0 +1,202 @@
+"""The vehicles that a planner knows, and the changes that it proposes, as arrays."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
+from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
+from coramp.road.rules import Rules
+from coramp.vehicles.separation import smallest_margin_m
+
+
+class Fleet(NamedTuple):
+    """All commitments. A vehicle is a row; ``live`` lists the rows now on the road, by entry.
+
+    Row i's trajectory is ``pieces[first_piece[i] : first_piece[i] + piece_count[i]]``.
+    ``merge_time_s`` is minus infinity for mainline vehicles, infinity for a ramp vehicle whose
+    merge is not committed. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
+    trajectory.
+    """
+
+    pieces: FloatArray
+    first_piece: IntArray
+    piece_count: IntArray
+    length_m: FloatArray
+    merge_time_s: FloatArray
+    lowest_m: FloatArray
+    highest_m: FloatArray
+    adjustable: BoolArray
+    live: IntArray
+
+
+class Proposal(NamedTuple):
+    """New trajectories for some rows; ``size[0]`` of the entries are in use.
+
+    The pieces start where the new trajectory takes over; what lies before stays as committed.
+    """
+
+    size: IntArray
+    rows: IntArray
+    piece_count: IntArray
+    pieces: FloatArray
+    merge_time_s: FloatArray
+
+
+ROUNDING_M = 1e-10
+"""What rounding may take from a distance before a planner calls it too small."""
+MAX_CHANGED = 32
+"""Vehicles that a cascade may change; one that needs more is given up."""
+
+
+@kernel
+def empty_proposal(room: int = MAX_CHANGED) -> Proposal:
+    """Returns a proposal that changes nothing, with room for so many vehicles."""
+    return Proposal(
+        np.zeros(1, np.int64),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.empty((room, MAX_PIECES, 4)),
+        np.empty(room),
+    )
+
+
+@kernel
+def is_full(proposal: Proposal) -> bool:
+    """Returns whether the proposal has no room for another vehicle."""
+    return bool(proposal.size[0] >= len(proposal.rows))
+
+
+@kernel
+def committed(fleet: Fleet, row: int) -> FloatArray:
+    """Returns the trajectory that ``row`` has committed to."""
+    start = fleet.first_piece[row]
+    return fleet.pieces[start : start + fleet.piece_count[row]]
+
+
+@kernel
+def entry_of(proposal: Proposal, row: int) -> int:
+    """Returns the index of ``row`` in the proposal, -1 if it is not changed."""
+    return place_among(proposal.rows, proposal.size[0], row)
+
+
+@kernel
+def place_among(rows: IntArray, count: int, row: int) -> int:
+    """Returns the place of ``row`` among the first ``count`` of ``rows``, -1 if it is not there."""
+    for k in range(count):
+        if rows[k] == row:
+            return k
+    return -1
+
+
+@kernel
+def proposed(proposal: Proposal, entry: int) -> FloatArray:
+    """Returns the trajectory of one entry of the proposal."""
+    return proposal.pieces[entry, : proposal.piece_count[entry]]
+
+
+@kernel
+def trajectory_under(fleet: Fleet, proposal: Proposal, row: int) -> FloatArray:
+    """Returns what ``row`` would drive under the proposal."""
+    entry = entry_of(proposal, row)
+    if entry >= 0:
+        return proposed(proposal, entry)
+    return committed(fleet, row)
+
+
+@kernel
+def merge_time_under_s(fleet: Fleet, proposal: Proposal, row: int) -> float:
+    """Returns the merge time (s) of ``row`` under the proposal."""
+    entry = entry_of(proposal, row)
+    if entry >= 0:
+        return float(proposal.merge_time_s[entry])
+    return float(fleet.merge_time_s[row])
+
+
+@kernel
+def ordered_margin_m(
+    one: FloatArray,
+    one_length_m: float,
+    other: FloatArray,
+    other_length_m: float,
+    start_s: float,
+    end_s: float,
+    rules: Rules,
+) -> float:
+    """Returns the smallest margin over Eq. 1 (m) of two vehicles in one lane, whichever leads.
+
+    The one further ahead at ``start_s`` leads; the span ends when it leaves the zone.
+    """
+    one_m, _ = station_and_speed(one, start_s)
+    other_m, _ = station_and_speed(other, start_s)
+    if one_m >= other_m:
+        end_s = min(end_s, time_at_station(one, rules.road.mainline_end_m))
+        margin_m, _ = smallest_margin_m(one, one_length_m, other, start_s, end_s, rules.safety)
+        return margin_m
+    end_s = min(end_s, time_at_station(other, rules.road.mainline_end_m))
+    margin_m, _ = smallest_margin_m(other, other_length_m, one, start_s, end_s, rules.safety)
+    return margin_m
+
+
+@kernel
+def merge_margin_m(
+    merging: FloatArray,
+    merging_length_m: float,
+    other: FloatArray,
+    other_length_m: float,
+    merge_s: float,
+    rules: Rules,
+) -> float:
+    """Returns the margin (m) over Eq. 15 or 16 of a vehicle to another, when it merges."""
+    merging_m, merging_mps = station_and_speed(merging, merge_s)
+    other_m, other_mps = station_and_speed(other, merge_s)
+    if other_m >= merging_m:
+        distance_m = other_m - other_length_m - merging_m
+    else:
+        distance_m = merging_m - merging_length_m - other_m
+    along_mps = merging_speed_along_mps(merging_mps, rules.road.merge_angle_rad)
+    return distance_m - merge_distance_m(along_mps, other_mps, rules.safety)
+
+
+@kernel
+def pair_margin_m(
+    one: FloatArray,
+    one_length_m: float,
+    one_merge_s: float,
+    other: FloatArray,
+    other_length_m: float,
+    other_merge_s: float,
+    from_s: float,
+    rules: Rules,
+) -> float:
+    """Returns the smallest margin (m) of two vehicles from ``from_s`` on, while in one lane.
+
+    Over Eq. 1 on the ramp with its acceleration lane until the first of them merges and on the
+    mainline once both are there, and over Eq. 15 or 16 at the moment of that merge.
+    """
+    smallest_m = math.inf
+    first_merge_s, last_merge_s = min(one_merge_s, other_merge_s), max(one_merge_s, other_merge_s)
+    if first_merge_s > from_s:
+        smallest_m = ordered_margin_m(
+            one, one_length_m, other, other_length_m, from_s, first_merge_s, rules
+        )
+    if math.isinf(last_merge_s) and last_merge_s > 0.0:
+        return smallest_m
+    together_s = max(from_s, last_merge_s)
+    on_mainline_m = ordered_margin_m(
+        one, one_length_m, other, other_length_m, together_s, math.inf, rules
+    )
+    smallest_m = min(smallest_m, on_mainline_m)
+    if last_merge_s >= from_s:
+        if one_merge_s >= other_merge_s:
+            at_merge_m = merge_margin_m(
+                one, one_length_m, other, other_length_m, last_merge_s, rules
+            )
+        else:
+            at_merge_m = merge_margin_m(
+                other, other_length_m, one, one_length_m, last_merge_s, rules
+            )
+        smallest_m = min(smallest_m, at_merge_m)
+    return smallest_m

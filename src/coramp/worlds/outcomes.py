@@ -1,0 +1,94 @@
+"""What the engines share: when a run ends, and its outcome from the ledger."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.driven import driven_pieces
+from coramp.coordination.plant import Arrival
+from coramp.records.outcome import Outcome, Passages, Pieces
+from coramp.scenarios.model import Scenario
+
+NEVER = 1 << 60
+
+
+def cap_step_of(scenario: Scenario) -> int:
+    """Returns the step at which a run is cut off."""
+    simulation = scenario.simulation
+    return round((simulation.horizon_s + simulation.drain_s) / scenario.control.step_s)
+
+
+def step_after_last_exit(coordinator: Coordinator, step_s: float) -> int:
+    """Returns a step at which everyone has left, ``NEVER`` where somebody stays."""
+    ledger = coordinator.ledger
+    if coordinator.waiting():
+        return NEVER
+    last_s = float(np.max(ledger.book.exit_s[: len(ledger)], initial=0.0))
+    return NEVER if math.isinf(last_s) else math.ceil(last_s / step_s) + 2
+
+
+def cooperative_outcome(
+    coordinator: Coordinator,
+    arrivals: Sequence[Arrival],
+    step_s: float,
+    end_step: int,
+    plan_error_m: FloatArray,
+    driven: Pieces | None = None,
+    collisions: int = 0,
+) -> Outcome:
+    """Returns the outcome of a cooperative run.
+
+    ``plan_error_m`` has one entry a row. ``driven`` is what a simulator made of the plans, in which
+    a lane change waits for the next step; without it they are driven as they are.
+    """
+    ledger, end_s = coordinator.ledger, end_step * step_s
+    vehicle_of_row, entry_step = coordinator.entered()
+    entry_s, merge_s, exit_s, error_m = (np.full(len(arrivals), np.nan) for _ in range(4))
+    entry_s[vehicle_of_row] = entry_step * step_s
+    merge_s[vehicle_of_row] = ledger.book.merge_time_s[: len(ledger)]
+    if driven is not None:
+        merge_s = np.ceil(merge_s / step_s - 1e-6) * step_s
+    exit_s[vehicle_of_row] = ledger.book.exit_s[: len(ledger)]
+    error_m[vehicle_of_row] = plan_error_m
+    merge_s[merge_s > end_s] = np.nan
+    exit_s[exit_s > end_s] = np.nan
+    first, lane, rows = driven_pieces(ledger, vehicle_of_row, len(arrivals), end_s)
+    planned = Pieces(first, rows)
+    return Outcome(
+        cooperative=True,
+        passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, error_m),
+        pieces=planned,
+        lane=lane,
+        driven=driven or planned,
+        end_s=end_s,
+        collisions=collisions,
+        decisions=tuple(coordinator.decisions),
+        refusals=tuple(coordinator.refusals),
+        interventions=coordinator.interventions,
+        vehicle_of_row=vehicle_of_row,
+    )
+
+
+def passages_of(
+    arrivals: Sequence[Arrival],
+    step_s: float,
+    entry_s: FloatArray,
+    merge_s: FloatArray,
+    exit_s: FloatArray,
+    plan_error_m: FloatArray,
+) -> Passages:
+    """Returns who passed when; arrays have one entry an arrival."""
+    return Passages(
+        tuple(arrival.vehicle_id for arrival in arrivals),
+        np.array([arrival.on_ramp for arrival in arrivals], np.bool_),
+        np.array([arrival.length_m for arrival in arrivals]),
+        np.array([arrival.step * step_s for arrival in arrivals]),
+        np.array([arrival.speed_mps for arrival in arrivals]),
+        entry_s,
+        merge_s,
+        exit_s,
+        plan_error_m,
+    )

@@ -1,0 +1,156 @@
+"""One SUMO simulation in this process; the only module that imports libsumo.
+
+Time: after ``step_to(n)`` SUMO has executed the steps 0 to n - 1, and vehicles stand where they
+are at step n - 1. What is commanded then governs the way from there to step n.
+"""
+
+import math
+import os
+import threading
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any, Self
+
+import libsumo as untyped_libsumo
+
+from coramp.errors import CorampError
+from coramp.worlds.sumo.network import sumo_binary
+
+libsumo: Any = untyped_libsumo
+
+OBEY = 32
+"""Speed mode without any check: the vehicle does what it is told."""
+NO_CHANGES = 0
+"""Lane change mode without changes of its own, and without checks of those commanded."""
+GREEN, YELLOW, RED = "G", "y", "r"
+FASTEST_COMMAND_MPS = 100.0
+ACTION_S = 1.0
+"""How often SUMO lets a vehicle that was taken over look around.
+
+In between it keeps its acceleration, which is what its pieces ask for; each command makes it act
+at once. That more than halves the time of a simulation step.
+"""
+
+
+class Session:
+    """A running simulation; use it as a context manager."""
+
+    _free = threading.Lock()
+    _owner: int | None = None
+
+    def __init__(self, options: Sequence[str], step_s: float, gui: bool = False) -> None:
+        """Starts SUMO; libsumo runs one simulation a process, so other threads wait for it."""
+        if Session._owner == threading.get_ident():
+            raise CorampError("SUMO: one simulation a process; the other one still runs")
+        if gui and not os.environ.get("DISPLAY"):
+            raise CorampError("--gui: there is no screen (DISPLAY is not set); run without --gui")
+        self._step_s = step_s
+        program = sumo_binary("sumo-gui" if gui else "sumo")
+        extra = ("--start", "--quit-on-end") if gui else ()
+        Session._free.acquire()
+        try:
+            libsumo.start([program, *options, "--step-length", repr(step_s), *extra])
+        except BaseException as error:
+            Session._free.release()
+            if isinstance(error, libsumo.TraCIException | libsumo.FatalTraCIError):
+                raise CorampError(f"SUMO: {error}") from error
+            raise
+        Session._owner = threading.get_ident()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            libsumo.close()
+        finally:
+            Session._owner = None
+            Session._free.release()
+
+    def step_to(self, step: int) -> None:
+        """Executes all steps before ``step``."""
+        libsumo.simulationStep(step * self._step_s)
+
+    def vehicles_left(self) -> int:
+        """Returns how many vehicles drive or are still to enter."""
+        return int(libsumo.simulation.getMinExpectedNumber())
+
+    def add(self, vehicle_id: str, route: str, kind: str, step: int, speed_mps: float) -> None:
+        """Lets a vehicle enter at ``step`` with its front at the start of its route."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.add(
+            vehicle_id,
+            route,
+            kind,
+            depart=repr(round(step * self._step_s, 6)),
+            departPos="0",
+            departSpeed=repr(speed_mps),
+        )
+
+    def take_over(self, vehicle_id: str) -> None:
+        """Switches off the vehicle's own driver."""
+        libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
+
+    def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
+        """Commands a speed from now on."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
+        self.act_now(vehicle_id)
+
+    def change_speed(self, vehicle_id: str, speed_mps: float, steps: int) -> None:
+        """Commands an even change to a speed over a number of steps."""
+        _check_speed(vehicle_id, speed_mps)
+        if steps < 1:
+            raise CorampError(f"SUMO: {vehicle_id}: cannot change speed over {steps} steps")
+        libsumo.vehicle.slowDown(vehicle_id, speed_mps, steps * self._step_s)
+        self.act_now(vehicle_id)
+
+    def change_lane(self, vehicle_id: str, lane: int) -> None:
+        """Commands a lane change at the end of the next step."""
+        libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
+        self.act_now(vehicle_id)
+
+    def set_signal(self, signal: str, lane: str, colour: str) -> None:
+        """Sets the links of a signal that come from ``lane``; all others stay green."""
+        links = libsumo.trafficlight.getControlledLinks(signal)
+        state = "".join(colour if link[0][0] == lane else GREEN for link in links)
+        libsumo.trafficlight.setRedYellowGreenState(signal, state)
+
+    def loop_occupancy(self, loop: str) -> float:
+        """Returns the share of the last step for which a loop was occupied.
+
+        SUMO's figure for an interval leaves out who still stands on the loop at its end.
+        """
+        return float(libsumo.inductionloop.getLastStepOccupancy(loop)) / 100.0
+
+    def vehicles_on(self, lane: str) -> set[str]:
+        """Returns who is on a lane now."""
+        return set(libsumo.lane.getLastStepVehicleIDs(lane))
+
+    def act_now(self, vehicle_id: str) -> None:
+        """Lets a vehicle act in the next step: it looks anew at the lanes before it."""
+        libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
+
+    def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
+        """Returns the lane that the vehicle's front is on, and its position along it (m).
+
+        Raises CorampError if the vehicle is not on the road.
+        """
+        try:
+            return (
+                libsumo.vehicle.getLaneID(vehicle_id),
+                libsumo.vehicle.getLanePosition(vehicle_id),
+            )
+        except libsumo.TraCIException as error:
+            raise CorampError(f"SUMO: {vehicle_id} is not on the road: {error}") from error
+
+
+def _check_speed(vehicle_id: str, speed_mps: float) -> None:
+    if not (math.isfinite(speed_mps) and 0.0 <= speed_mps <= FASTEST_COMMAND_MPS):
+        raise CorampError(f"SUMO: {vehicle_id}: a speed of {speed_mps} m/s is not to be commanded")

@@ -1,0 +1,50 @@
+"""What tells one driver of a population from another: time gap and speed factor."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.coordination.plant import STREAMS, Arrival
+from coramp.demand.arrivals import generator
+from coramp.scenarios.model import Drivers, SpeedFactor
+
+
+@dataclass(frozen=True)
+class Traits:
+    """One driver: the time gap that it keeps, and its wish over the common speed, None for 1."""
+
+    tau_s: float
+    speed_factor: float | None
+
+
+def traits_of(drivers: Drivers, arrivals: Sequence[Arrival], seed: int) -> list[Traits]:
+    """Returns the traits of each arrival's driver.
+
+    Each stream and each trait has random numbers of its own, one a vehicle in the order of
+    arrival: a vehicle keeps its draw whatever else changes.
+    """
+    traits: list[Traits | None] = [None] * len(arrivals)
+    for on_ramp, stream in enumerate(STREAMS):
+        places = [k for k, arrival in enumerate(arrivals) if arrival.on_ramp == bool(on_ramp)]
+        draws = [
+            generator(seed, f"drivers/{trait}/{stream}").random(len(places))
+            for trait in ("time gap", "speed factor")
+        ]
+        taus_s = np.array(drivers.taus_s)[(draws[0] * len(drivers.taus_s)).astype(np.int64)]
+        factors = _speed_factors(drivers.speed_factor, draws[1])
+        for place, tau_s, factor in zip(places, taus_s.tolist(), factors, strict=True):
+            traits[place] = Traits(tau_s, factor)
+    return [found for found in traits if found is not None]
+
+
+def _speed_factors(asked: SpeedFactor | None, draws: FloatArray) -> list[float | None]:
+    """The quantiles of the cut-off normal distribution at draws from 0 to 1."""
+    if asked is None:
+        return [None] * len(draws)
+    normal = NormalDist(asked.mean, asked.deviation)
+    low, high = normal.cdf(asked.low), normal.cdf(asked.high)
+    shares = low + (high - low) * draws
+    return [min(asked.high, max(asked.low, normal.inv_cdf(share))) for share in shares.tolist()]
