@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,19 +11,11 @@ import polars as pl
 from coramp.errors import CorampError
 from coramp.explain.decision import Quantity, quantities
 from coramp.records.files import made_folder, staged_folder
-from coramp.records.run_folder import MARK, StoredRun, write_run
-from coramp.records.schemas import Row
+from coramp.records.run_folder import MARK, write_run
 from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
 from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
 from coramp.runs.planning import PlannedSnapshot, plan_snapshot
-from coramp.runs.running import (
-    RunSpec,
-    broken_promises,
-    engine_checked,
-    execute,
-    make_spec,
-    run_content,
-)
+from coramp.runs.running import RunSpec, broken_promises, engine_checked, make_spec, recorded
 from coramp.scenarios.snapshots import load_snapshot
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
@@ -31,6 +23,7 @@ from coramp.studies.cluster import connected
 from coramp.studies.definition import Study, count_runs, expand, load_study, sort_key
 from coramp.studies.outlook import Outlook, outlook_of
 from coramp.studies.runner import ALL_WORKERS, Progress, run_missing, run_searches, usable_cores
+from coramp.studies.shown import keep_shown
 from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
@@ -50,55 +43,21 @@ MANY_RUNS = 100_000
 
 @dataclass(frozen=True)
 class RunResult(RunPlots):
-    """A run: its summary (the row of ``runs.parquet``) and its records as polars frames."""
+    """A run: its specification, its summary (the row of ``runs.parquet``) and its tables.
 
-    spec: RunSpec
-    summary: Row
-    vehicles: pl.DataFrame
-    speeds: pl.DataFrame
-    trajectories: pl.DataFrame | None
-    decisions: pl.DataFrame | None
-    positions: pl.DataFrame | None
-    violations: pl.DataFrame
+    ``frames`` are the tables by name: vehicles and speeds, violations, and positions, or
+    trajectories and decisions if cooperative.
+    """
 
-    @property
-    def frames(self) -> dict[str, pl.DataFrame]:
-        """The records by name; positions, or trajectories and decisions if cooperative."""
-        every = {
-            "positions": self.positions,
-            "violations": self.violations,
-            "vehicles": self.vehicles,
-            "speeds": self.speeds,
-            "trajectories": self.trajectories,
-            "decisions": self.decisions,
-        }
-        return {name: frame for name, frame in every.items() if frame is not None}
+    spec: RunSpec = field(kw_only=True)
 
     @property
     def broken_promises(self) -> list[str]:
         """What a cooperative run promised and did not keep; empty where all is well."""
         return broken_promises(self.summary)
 
-    @property
-    def stored(self) -> StoredRun:
-        """The run as it would be read from its folder."""
-        return StoredRun(
-            self.content,
-            self.vehicles,
-            self.speeds,
-            self.trajectories,
-            self.decisions,
-            self.positions,
-            self.violations,
-        )
-
-    @property
-    def content(self) -> Row:
-        """What ``run.json`` holds: specification, versions and summary."""
-        return run_content(self.spec, self.summary)
-
     def to_pandas(self) -> dict[str, "pd.DataFrame"]:
-        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
+        """Returns the tables as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
         return {name: as_pandas(frame) for name, frame in self.frames.items()}
 
 
@@ -218,22 +177,13 @@ def run(
         return _executed(spec, SumoOptions(gui=gui))
     with staged_folder(Path(out), MARK) as stage:
         result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
-        write_run(stage, result.content, result.frames)
+        write_run(stage, result)
     return result
 
 
 def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
-    tables, row = execute(spec, options)
-    return RunResult(
-        spec,
-        row,
-        tables.vehicles,
-        tables.speeds,
-        tables.trajectories,
-        tables.decisions,
-        tables.positions,
-        tables.violations,
-    )
+    records = recorded(spec, options)
+    return RunResult(**{f.name: getattr(records, f.name) for f in fields(records)}, spec=spec)
 
 
 def study(
@@ -254,8 +204,9 @@ def study(
     ``out/NAME``), and a study that was interrupted goes on from there. ``jobs`` processes work at
     a time (default: one a core), or the workers of a Dask ``cluster``. ``engine`` moves the
     cooperative runs to another engine. ``many`` allows more than a hundred thousand runs.
-    ``progress`` is called at the start and after every run, ``notice`` once beforehand where the
-    demand of runs is above their lane's limit. Raises CorampError for a study that cannot be run;
+    ``progress`` is called at the start and after every run, ``notice`` beforehand where the
+    demand of runs is above their lane's limit, and before the runs that the report shows are made
+    once more, to keep their records. Raises CorampError for a study that cannot be run;
     runs that fail are rows of the result.
     """
     definition, seeds = _defined(name, seeds, engine, many)
@@ -272,6 +223,7 @@ def study(
     everything = {spec.run_id: spec for spec in (*specs, *searched)}
     runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
     tables = summary_tables(definition, runs)
+    keep_shown(store.folder, definition, runs.filter(status="ok"), notice or (lambda _: None))
     store.write_tables(runs, streams, to_markdown(definition, tables))
     if definition.layout == "capacity":
         from coramp.report.capacity_figure import save_capacity_figure
@@ -350,9 +302,9 @@ def figures(
     place; that of a capacity study adds its figure. Raises CorampError for what cannot be run,
     read or written.
     """
-    from coramp.report.drawn_runs import drawn_runs, specs_of
     from coramp.report.figures import save_figures
     from coramp.report.study_folder import read_study
+    from coramp.studies.drawn_runs import drawn_runs, specs_of
 
     if seeds < 1:
         raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")

@@ -430,9 +430,12 @@ def test_what_is_printed_is_what_was_measured(kept):
 def test_a_study_leaves_exactly_what_is_promised(studied):
     runs = studied.table("runs")
     parts = [f"parts/{run_id}.json" for run_id in runs["run_id"]]
-    assert everything_below(studied.folder) == sorted(
-        ["parts", *parts, "runs.parquet", "streams.parquet", "study.json", "tables.md"]
+    found = everything_below(studied.folder)
+    shown = [name for name in found if name.startswith("shown/")]
+    assert [name for name in found if name not in shown] == sorted(
+        ["parts", *parts, "runs.parquet", "shown", "streams.parquet", "study.json", "tables.md"]
     )
+    assert {name.split("/")[1] for name in shown} <= set(runs["run_id"])
     assert set(RUNS) <= set(runs.columns)
     order = [column for column in runs.columns if column in RUNS]
     assert order == RUNS
@@ -527,7 +530,7 @@ def unsafe(execute):
 
 
 def test_an_unsafe_run_exits_with_3_and_still_leaves_its_records(tmp_path, monkeypatch):
-    monkeypatch.setattr(coramp.api, "execute", unsafe(coramp.api.execute))
+    monkeypatch.setattr(coramp.runs.running, "execute", unsafe(coramp.runs.running.execute))
     short = ("run", "paper", "--horizon", "5", "--out", tmp_path / "r")
     told = invoke(*short)
     assert told.code == 3

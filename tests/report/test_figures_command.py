@@ -9,7 +9,7 @@ import pytest
 
 import coramp
 import coramp.api
-import coramp.report.drawn_runs
+import coramp.studies.drawn_runs
 from coramp import CorampError
 from coramp.report.figures import LEFT_OUT, LONG_STUDIES, save_figures
 from coramp.report.study_folder import read_study
@@ -95,7 +95,7 @@ def test_a_second_call_runs_nothing_and_gives_the_same_bytes(drawn, studies, mon
     def forbidden(*_):
         raise AssertionError("it ran again")
 
-    monkeypatch.setattr(coramp.report.drawn_runs, "execute", forbidden)
+    monkeypatch.setattr(coramp.studies.drawn_runs, "recorded", forbidden)
     before = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
     told = invoke(*call(studies, out), "--json")
     assert told.code == 0

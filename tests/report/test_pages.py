@@ -176,6 +176,19 @@ def test_a_half_done_study_says_how_much(folders, tmp_path):
     assert "7 of 8 runs with 2 seeds are done" in report(half).read_text()
 
 
+def test_a_study_without_kept_runs_says_so_and_gets_them_again(folders, tmp_path):
+    bare = shutil.copytree(folders / "study", tmp_path / "bare")
+    kept = {path.name for path in (bare / "shown").iterdir()}
+    assert len(kept) == 4
+    shutil.rmtree(bare / "shown")
+    assert "has kept no runs to watch" in report(bare).read_text()
+    said = []
+    coramp.study(str(folders / "s.toml"), seeds=2, jobs=1, out=bare, notice=said.append)
+    assert said == ["keeping the records of 4 runs for the report"]
+    assert {path.name for path in (bare / "shown").iterdir()} == kept
+    assert "has kept no runs to watch" not in report(bare).read_text()
+
+
 def test_failed_runs_are_listed(folders, tmp_path):
     import polars as pl
 
@@ -213,12 +226,8 @@ def test_a_run_that_gives_other_delays_than_the_study_is_not_shown(folders, tmp_
     mine = pl.col("strategy") == "ramp-priority"
     delay = pl.when(mine).then(pl.col("ramp_delay_s") + 1.0).otherwise("ramp_delay_s")
     runs.with_columns(ramp_delay_s=delay).write_parquet(other / "runs.parquet")
-    said = []
-    text = report(other, say=said.append).read_text()
-    assert (
-        said.count("ramp priority is not shown: run again it gives other delays than the study has")
-        == 2
-    )
+    text = report(other).read_text()
+    assert text.count("is not shown: its records have other delays than the study") == 2
     assert ">ramp priority</option>" not in text
     assert ">mainline priority</option>" in text
 

@@ -6,9 +6,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from coramp.records.run import RunRecords
 from coramp.records.schemas import DECISIONS, SPEEDS
 from coramp.report.road_figure import road_figure
-from coramp.report.run_figures import DrawnRun, margin_distribution, margin_figure, speed_figure
+from coramp.report.run_figures import margin_distribution, margin_figure, speed_figure
+from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.loading import load_scenario
 
 
@@ -25,7 +27,17 @@ def drawn(strategy="mainline-priority", drivers=None, ramp=200.0, seed=1, mps=20
     )
     rows = [{**dict.fromkeys(DECISIONS), "min_margin_m": margin_m} for margin_m in margins]
     decisions = None if drivers else pl.DataFrame(rows, schema=DECISIONS)
-    return DrawnRun(strategy, drivers, 1800.0, ramp, seed, 5.0, speeds, decisions)
+    spec = make_spec(
+        "paper",
+        strategy,
+        engine="sumo",
+        drivers=drivers,
+        mainline_veh_h=1800.0,
+        ramp_veh_h=ramp,
+        seed=seed,
+        horizon_s=5.0,
+    )
+    return RunRecords(run_content(spec, {}), {}, pl.DataFrame(), speeds, decisions=decisions)
 
 
 def test_speeds_are_drawn_bin_by_bin_with_a_gap_where_nobody_was():

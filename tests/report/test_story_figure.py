@@ -10,7 +10,8 @@ from matplotlib.colors import to_hex
 import coramp
 from coramp import CorampError
 from coramp.explain.story import story_in
-from coramp.records.run_folder import StoredRun, read_run
+from coramp.records.run import RunRecords
+from coramp.records.run_folder import read_run
 from coramp.report.story_figure import save_story_figure, story_figure
 from coramp.report.story_scene import scene_of
 from tests.edges import assert_refused, everything_below, invoke
@@ -153,8 +154,9 @@ def test_the_last_decision_that_merges_counts(run):
 
 def test_a_hold_without_a_merge_is_drawn_without_one(run):
     name = run.decisions.filter(rung="hold")["vehicle_id"][0]
-    only = StoredRun(
+    only = RunRecords(
         run.content,
+        run.summary,
         run.vehicles,
         run.speeds,
         run.trajectories,
@@ -194,7 +196,7 @@ def test_without_a_decision_its_own_passage_is_drawn(run):
 def test_who_never_entered_cannot_be_drawn(run):
     name = run.vehicles["vehicle_id"][0]
     without = run.trajectories.filter(pl.col("vehicle_id") != name)
-    only = StoredRun(run.content, run.vehicles, run.speeds, without, run.decisions)
+    only = RunRecords(run.content, run.summary, run.vehicles, run.speeds, without, run.decisions)
     with pytest.raises(CorampError, match=f"{name} never entered"):
         story_figure(only, name)
 

@@ -50,7 +50,9 @@ def copied(whole, tmp_path):
     (target / "parts").mkdir(parents=True)
     for path in whole.result.folder.rglob("*"):
         if path.is_file():
-            (target / path.relative_to(whole.result.folder)).write_bytes(path.read_bytes())
+            copy = target / path.relative_to(whole.result.folder)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
     written(tmp_path)
     return target
 

@@ -279,7 +279,7 @@ def report(
     from coramp.cli.console import written
     from coramp.report.writing import report as write_report
 
-    written(write_report(folder, against, lambda text: print(text, file=sys.stderr)))
+    written(write_report(folder, against))
 
 
 @app.command(epilog="Example: coramp replay out/r --against out/u")

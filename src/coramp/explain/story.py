@@ -6,7 +6,8 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.explain.decision import EVEN_M, Quantity, quantities
-from coramp.records.run_folder import StoredRun, moved_for, read_run
+from coramp.records.run import RunRecords, moved_for
+from coramp.records.run_folder import read_run
 from coramp.records.schemas import Row
 
 
@@ -36,7 +37,7 @@ def story_of(folder: Path, vehicle_id: str) -> Story:
     return story_in(read_run(folder), vehicle_id, folder)
 
 
-def story_in(run: StoredRun, vehicle_id: str, folder: Path | None = None) -> Story:
+def story_in(run: RunRecords, vehicle_id: str, folder: Path | None = None) -> Story:
     """Returns the story of a vehicle of a run that is at hand; errors name the ``folder``, if any.
 
     Raises CorampError where there is no such vehicle, or nothing was planned.

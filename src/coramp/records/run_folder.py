@@ -1,74 +1,25 @@
-"""What a run leaves in its folder, and reading it back."""
+"""The folder of a run: writing it, and reading it back."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import polars as pl
 
 from coramp.errors import CorampError
 from coramp.records.files import read_json, write_json, write_parquet
+from coramp.records.run import TABLES, RunRecords
 from coramp.records.schemas import RESULT_VERSION, Row
-from coramp.scenarios.model import Scenario
 
 MARK = "run.json"
-TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
 
 
-@dataclass(frozen=True)
-class StoredRun:
-    """A run as read from its folder.
-
-    There are trajectories and decisions only of cooperative runs, and positions of the others.
-    Violations and positions are None where the run was written by a coramp that kept none.
-    """
-
-    content: Row
-    vehicles: pl.DataFrame
-    speeds: pl.DataFrame
-    trajectories: pl.DataFrame | None
-    decisions: pl.DataFrame | None
-    positions: pl.DataFrame | None = None
-    violations: pl.DataFrame | None = None
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario that was run."""
-        return Scenario.model_validate(self.content["specification"], strict=False)
-
-    def vehicle(self, vehicle_id: str) -> Row:
-        """Returns a vehicle's row; raises CorampError where there is none such."""
-        found = self.vehicles.filter(vehicle_id=vehicle_id)
-        if found.is_empty():
-            known = sorted(self.vehicles["vehicle_id"].to_list())
-            allowed = f"allowed are {known[0]} to {known[-1]}" if known else "nobody arrived"
-            raise CorampError(f"there is no vehicle {vehicle_id!r}; {allowed}")
-        return found.row(0, named=True)
-
-    def coordinated(self, what: str) -> tuple[pl.DataFrame, pl.DataFrame]:
-        """Returns trajectories and decisions; ``what`` is what they are wanted for, as a verb.
-
-        Raises CorampError for a run in which nobody was coordinated, or where one is lost.
-        """
-        if self.trajectories is None and self.decisions is None:
-            raise CorampError(f"nobody was coordinated in this run; {what} a cooperative one")
-        if self.trajectories is None or self.decisions is None:
-            raise CorampError("is not complete; run again with the same --out")
-        return self.trajectories, self.decisions
+def write_run(folder: Path, records: RunRecords) -> None:
+    """Writes all files of a run into an existing folder."""
+    for name, frame in records.frames.items():
+        write_parquet(folder / f"{name}.parquet", frame)
+    write_json(folder / MARK, records.content)
 
 
-def write_run(folder: Path, content: Row, frames: Mapping[str, pl.DataFrame]) -> None:
-    """Writes all files of a run into an existing folder.
-
-    ``content`` is what ``run.json`` holds; ``frames`` are named as in ``TABLES``.
-    """
-    for name, frame in frames.items():
-        if name in TABLES:
-            write_parquet(folder / f"{name}.parquet", frame)
-    write_json(folder / MARK, content)
-
-
-def read_run(folder: Path) -> StoredRun:
+def read_run(folder: Path) -> RunRecords:
     """Returns a run from its folder; raises CorampError where there is none."""
     if not (folder / MARK).exists():
         raise CorampError(
@@ -85,11 +36,10 @@ def read_run(folder: Path) -> StoredRun:
             frames[name] = pl.read_parquet(path) if path.exists() else None
         except (OSError, pl.exceptions.PolarsError) as error:
             raise CorampError(f"{path}: cannot be read: {error}; run again") from error
-    vehicles, speeds = frames["vehicles"], frames["speeds"]
+    vehicles, speeds = frames.pop("vehicles"), frames.pop("speeds")
     if vehicles is None or speeds is None:
         raise CorampError(f"{folder}: is not complete; run again with the same --out")
-    others = ("trajectories", "decisions", "positions", "violations")
-    return StoredRun(content, vehicles, speeds, *(frames[name] for name in others))
+    return RunRecords(content, content["summary"], vehicles, speeds, **frames)
 
 
 def check_version(folder: Path, content: Row) -> None:
@@ -100,9 +50,3 @@ def check_version(folder: Path, content: Row) -> None:
             f"{folder}: was written by a newer coramp (results {version}); this one reads up to "
             f"{RESULT_VERSION}: update coramp, or run again"
         )
-
-
-def moved_for(decisions: pl.DataFrame, vehicle_id: str) -> list[Row]:
-    """Returns the decisions about others that moved a vehicle aside or braked it."""
-    moved = pl.col("adjusted_vehicle_ids").list.contains(vehicle_id).fill_null(value=False)
-    return decisions.filter(moved).rows(named=True)

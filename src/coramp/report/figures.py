@@ -8,6 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from coramp.records.files import made_folder
+from coramp.records.run import RunRecords
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -15,7 +16,7 @@ from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.formula_figures import collision_figure, fuel_figure
 from coramp.report.front_figure import front_figure
 from coramp.report.road_figure import road_figure
-from coramp.report.run_figures import DrawnRun, margin_figure, speed_figure
+from coramp.report.run_figures import margin_figure, speed_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import StoredStudy
 from coramp.report.style import save_figure
@@ -48,7 +49,7 @@ class FigureSet:
 
 
 def save_figures(
-    folder: Path, studies: Mapping[str, StoredStudy], runs: Sequence[DrawnRun]
+    folder: Path, studies: Mapping[str, StoredStudy], runs: Sequence[RunRecords]
 ) -> FigureSet:
     """Writes every figure into a folder, in each of the formats.
 
@@ -71,7 +72,7 @@ def save_figures(
 
 
 def _catalogue(
-    studies: Mapping[str, StoredStudy], runs: Sequence[DrawnRun]
+    studies: Mapping[str, StoredStudy], runs: Sequence[RunRecords]
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Every figure's name with what draws it, in the order of the paper, then ours."""
     scenario, snapshot = load_scenario(SCENARIO), load_snapshot(EXAMPLE)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.records.run_folder import StoredRun
+from coramp.records.run import RunRecords
 from coramp.runs.planning import PlannedSnapshot
 from coramp.studies.tables import Table
 
@@ -14,13 +14,8 @@ if TYPE_CHECKING:
     from coramp.report.style import Figure
 
 
-class RunPlots:
-    """The figures of one run."""
-
-    @property
-    def stored(self) -> StoredRun:
-        """The run as it would be read from its folder."""
-        raise NotImplementedError
+class RunPlots(RunRecords):
+    """The records of one run, and its figures."""
 
     def plot_time_space(
         self, from_s: float | None = None, until_s: float | None = None
@@ -32,28 +27,16 @@ class RunPlots:
         """
         from coramp.report.time_space_figure import run_time_space_figure
 
-        return run_time_space_figure(self.stored, from_s, until_s)
+        return run_time_space_figure(self, from_s, until_s)
 
     def plot_speeds(self) -> "Figure":
         """Returns the mean speed (m/s) of mainline and ramp over time (s).
 
         Faint lines are bins of 1 s, bold ones means over a minute.
         """
-        from coramp.report.run_figures import DrawnRun, both_speeds_figure
+        from coramp.report.run_figures import both_speeds_figure
 
-        run = self.stored
-        content, horizon_s = run.content, run.scenario.simulation.horizon_s
-        drawn = DrawnRun(
-            strategy=content["strategy"],
-            drivers=content["drivers"],
-            mainline_veh_h=content["mainline_veh_h"],
-            ramp_veh_h=content["ramp_veh_h"],
-            seed=content["seed"],
-            horizon_s=horizon_s,
-            speeds=run.speeds,
-            decisions=run.decisions,
-        )
-        return both_speeds_figure(drawn)
+        return both_speeds_figure(self)
 
     def plot_decision(self, vehicle_id: str) -> "Figure":
         """Returns the road at a vehicle's decision and the time-space diagram around it.
@@ -64,14 +47,13 @@ class RunPlots:
         """
         from coramp.report.story_figure import story_figure
 
-        return story_figure(self.stored, vehicle_id)
+        return story_figure(self, vehicle_id)
 
     def _repr_html_(self) -> str:
         """Returns how a notebook shows the run: summary, replay and time-space diagram."""
         from coramp.report.page.notebook import run_html
-        from coramp.report.page.shown import shown_run
 
-        return run_html(shown_run(self.stored))
+        return run_html(self)
 
 
 class PlanPlots:

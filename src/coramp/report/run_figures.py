@@ -1,7 +1,6 @@
 """What single runs say: mean speed over time (Fig. 14, 15), and margins of decisions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
@@ -9,44 +8,31 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coramp.metrics.motion import BIN_S
+from coramp.records.run import RunRecords
 from coramp.report.style import BLACK, grid, legend_below, look_of, new_figure
 
 SMOOTH_S = 60
 """Over how many bins of 1 s the bold lines are means, each bin weighed by its vehicles."""
 
 
-@dataclass(frozen=True)
-class DrawnRun:
-    """A run that is drawn: who, at which flows (veh/h), with what seed; speeds and decisions."""
-
-    strategy: str
-    drivers: str | None
-    mainline_veh_h: float
-    ramp_veh_h: float
-    seed: int
-    horizon_s: float
-    speeds: pl.DataFrame
-    decisions: pl.DataFrame | None
-
-
-def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
+def speed_figure(runs: Sequence[RunRecords], stream: str) -> Figure:
     """Returns a stream's mean speed (m/s) over time (s), a diagram a ramp flow (Fig. 14, 15).
 
     Faint lines are bins of 1 s, bold ones means over a minute; the runs of the first seed are
     drawn.
     """
-    first = [run for run in runs if run.seed == min(r.seed for r in runs)]
-    ramps = sorted({run.ramp_veh_h for run in first})
+    first = [run for run in runs if run.content["seed"] == min(r.content["seed"] for r in runs)]
+    ramps = sorted({run.content["ramp_veh_h"] for run in first})
     figure = new_figure(9.0, 2.0 * len(ramps) + 0.6)
     diagrams = figure.subplots(len(ramps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, ramp in zip(diagrams, ramps, strict=True):
-        here = [run for run in first if run.ramp_veh_h == ramp]
+        here = [run for run in first if run.content["ramp_veh_h"] == ramp]
         for run in here:
             _draw_speed(axes, run, stream)
         axes.set(
-            title=f"{here[0].mainline_veh_h:g} + {ramp:g} veh/h",
+            title=here[0].flows,
             ylabel=f"{stream} speed (m/s)",
-            xlim=(0.0, max(run.horizon_s for run in here)),
+            xlim=(0.0, max(run.scenario.simulation.horizon_s for run in here)),
         )
     grid(*diagrams)
     diagrams[-1].set_xlabel("time (s)")
@@ -54,7 +40,7 @@ def speed_figure(runs: Sequence[DrawnRun], stream: str) -> Figure:
     return figure
 
 
-def both_speeds_figure(run: DrawnRun) -> Figure:
+def both_speeds_figure(run: RunRecords) -> Figure:
     """Returns the mean speed (m/s) of mainline and ramp over time (s) in one run.
 
     Faint lines are bins of 1 s, bold ones means over a minute.
@@ -63,17 +49,17 @@ def both_speeds_figure(run: DrawnRun) -> Figure:
     diagrams = figure.subplots(2, 1, sharex=True)
     for axes, stream in zip(diagrams, ("mainline", "ramp"), strict=True):
         _draw_speed(axes, run, stream)
-        axes.set(ylabel=f"{stream} speed (m/s)", xlim=(0.0, run.horizon_s))
-    flows = f"{run.mainline_veh_h:g} + {run.ramp_veh_h:g} veh/h"
-    diagrams[0].set_title(f"{look_of(run.strategy, run.drivers).label}, {flows}, seed {run.seed}")
+        axes.set(ylabel=f"{stream} speed (m/s)", xlim=(0.0, run.scenario.simulation.horizon_s))
+    who = look_of(run.content["strategy"], run.content["drivers"]).label
+    diagrams[0].set_title(f"{who}, {run.flows}, seed {run.content['seed']}")
     diagrams[1].set_xlabel("time (s)")
     grid(*diagrams)
     return figure
 
 
-def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
-    look = look_of(run.strategy, run.drivers)
-    bins = pl.DataFrame({"time_s": np.arange(0.0, run.horizon_s, BIN_S)}).join(
+def _draw_speed(axes: Axes, run: RunRecords, stream: str) -> None:
+    look = look_of(run.content["strategy"], run.content["drivers"])
+    bins = pl.DataFrame({"time_s": np.arange(0.0, run.scenario.simulation.horizon_s, BIN_S)}).join(
         run.speeds.filter(stream=stream), on="time_s", how="left", maintain_order="left"
     )
     times_s, speeds_mps = bins["time_s"].to_numpy(), bins["mean_speed_mps"].to_numpy()
@@ -96,7 +82,7 @@ def _draw_speed(axes: Axes, run: DrawnRun, stream: str) -> None:
     )
 
 
-def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
+def margin_figure(runs: Sequence[RunRecords], allowance_m: float) -> Figure:
     """Returns how many decisions (%) have at most a margin (m) over the safe distance.
 
     The margin of a decision is the least of all vehicles that it changes to all others, as the
@@ -104,14 +90,16 @@ def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
     A diagram a ramp flow, a line a strategy, decisions of all seeds together.
     """
     cooperative = [run for run in runs if run.decisions is not None]
-    ramps = sorted({run.ramp_veh_h for run in cooperative})
+    ramps = sorted({run.content["ramp_veh_h"] for run in cooperative})
     figure = new_figure(9.0, 3.5)
     diagrams = figure.subplots(1, len(ramps), sharex=True, sharey=True, squeeze=False)[0]
     for axes, ramp in zip(diagrams, ramps, strict=True):
-        here = [run for run in cooperative if run.ramp_veh_h == ramp]
-        for strategy in dict.fromkeys(run.strategy for run in here):
+        here = [run for run in cooperative if run.content["ramp_veh_h"] == ramp]
+        for strategy in dict.fromkeys(run.content["strategy"] for run in here):
             look = look_of(strategy)
-            margins_m, shares = margin_distribution([r for r in here if r.strategy == strategy])
+            margins_m, shares = margin_distribution(
+                [r for r in here if r.content["strategy"] == strategy]
+            )
             axes.step(
                 margins_m,
                 100.0 * shares,
@@ -125,7 +113,7 @@ def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
             allowance_m, color=BLACK, linewidth=0.9, linestyle="--", label="what the checker asks"
         )
         axes.set(
-            title=f"{here[0].mainline_veh_h:g} + {ramp:g} veh/h",
+            title=here[0].flows,
             xscale="log",
             xlabel="margin over the safe distance (m)",
             ylim=(0.0, 101.0),
@@ -137,7 +125,7 @@ def margin_figure(runs: Sequence[DrawnRun], allowance_m: float) -> Figure:
     return figure
 
 
-def margin_distribution(runs: Sequence[DrawnRun]) -> tuple[np.ndarray, np.ndarray]:
+def margin_distribution(runs: Sequence[RunRecords]) -> tuple[np.ndarray, np.ndarray]:
     """Returns the margins (m) of all decisions that change something, ascending, and shares.
 
     A share is that of decisions with at most that margin; vehicles that are alone have no margin

@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coramp.records.run_folder import StoredRun
+from coramp.records.run import RunRecords
 from coramp.report.plan_figure import name_lines
 from coramp.report.story_road import draw_road, label_in, look_in
 from coramp.report.story_scene import Scene, scene_of
@@ -27,7 +27,7 @@ RAMP_NAMES = "r"
 """How names of ramp vehicles begin."""
 
 
-def save_story_figure(run: StoredRun, vehicle_id: str, path: Path) -> None:
+def save_story_figure(run: RunRecords, vehicle_id: str, path: Path) -> None:
     """Writes the figure of a vehicle of a run; the file's ending says how (png, svg, pdf).
 
     Raises CorampError where that cannot be written, and as ``story_figure`` does.
@@ -35,7 +35,7 @@ def save_story_figure(run: StoredRun, vehicle_id: str, path: Path) -> None:
     save_plot(lambda: story_figure(run, vehicle_id), path)
 
 
-def story_figure(run: StoredRun, vehicle_id: str) -> Figure:
+def story_figure(run: RunRecords, vehicle_id: str) -> Figure:
     """Returns the road (stations in m) at a vehicle's decision, and station over time around it.
 
     The decision is the last that gave the vehicle a merge, else its last, else the last that moved

@@ -12,7 +12,7 @@ from coramp._kernel import FloatArray
 from coramp.equations.safe_distance import merge_clearance_m
 from coramp.errors import CorampError
 from coramp.kinematics.trajectory import TIME, station_and_speed
-from coramp.records.run_folder import StoredRun, moved_for
+from coramp.records.run import RunRecords, moved_for
 from coramp.records.schemas import Row
 from coramp.report.plan_figure import COLUMNS
 from coramp.scenarios.model import Scenario
@@ -110,7 +110,7 @@ class Scene:
         )
 
 
-def scene_of(run: StoredRun, vehicle_id: str) -> Scene:
+def scene_of(run: RunRecords, vehicle_id: str) -> Scene:
     """Returns the scene to draw of a vehicle of a run.
 
     The last decision about it that gave a merge, else the last one; else the last that moved it
@@ -185,7 +185,7 @@ def _roles(decision: Row) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _passage(run: StoredRun, vehicle_id: str, driven: Mapping[str, Driven]) -> Scene:
+def _passage(run: RunRecords, vehicle_id: str, driven: Mapping[str, Driven]) -> Scene:
     """The scene of a vehicle that no decision had to do with, with who leaves before and after."""
     left = run.vehicles.filter(pl.col("exit_s").is_not_null()).sort("exit_s")["vehicle_id"]
     order, roles = left.to_list(), {vehicle_id: (SUBJECT,)}

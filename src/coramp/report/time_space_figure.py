@@ -5,7 +5,7 @@ import math
 from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
-from coramp.records.run_folder import StoredRun
+from coramp.records.run import RunRecords
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
 from coramp.report.style import YELLOW, grid, legend_below, new_figure
@@ -16,7 +16,7 @@ STEP_S = 0.25
 
 
 def run_time_space_figure(
-    run: StoredRun, from_s: float | None = None, until_s: float | None = None
+    run: RunRecords, from_s: float | None = None, until_s: float | None = None
 ) -> Figure:
     """Returns station (m) over time (s) of all vehicles of a cooperative run, a line each.
 
@@ -73,11 +73,11 @@ def _look(driven: Driven, moved: bool) -> tuple[str, str, float]:
     return MAINLINE_COLOUR, "mainline vehicle", 0.7
 
 
-def _title(run: StoredRun) -> str:
+def _title(run: RunRecords) -> str:
     content = run.content
     flows = f"{content['mainline_veh_h']:g} + {content['ramp_veh_h']:g} veh/h"
     return f"{content['scenario']}: {content['strategy']}, {flows}, seed {content['seed']}"
 
 
-def _start_m(run: StoredRun) -> float:
+def _start_m(run: RunRecords) -> float:
     return min(run.scenario.mainline.start_m, run.scenario.ramp.start_m)

@@ -1,13 +1,12 @@
 """Writing reports and replays of what lies in a folder."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from coramp.errors import CorampError
 from coramp.records.files import write_text
-from coramp.records.run_folder import MARK, StoredRun, read_run
+from coramp.records.run import RunRecords
+from coramp.records.run_folder import MARK, read_run
 from coramp.report.page.pages import replay_page, run_page
-from coramp.report.page.shown import ShownRun, shown_run
 from coramp.report.page.study_page import study_page
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.store import MARK as STUDY_MARK
@@ -18,12 +17,11 @@ REPORT, REPLAY = "report.html", "replay.html"
 def report(
     folder: str | Path,
     against: str | Path | None = None,
-    say: Callable[[str], None] = lambda _: None,
 ) -> Path:
     """Writes ``report.html`` into the folder of a run or a study and returns its path.
 
     One file that works without a network. ``against`` is the folder of another run on the same
-    arrivals, to stand beside a run. ``say`` is told what is under way. Raises CorampError where
+    arrivals, to stand beside a run. Raises CorampError where
     there is nothing to report, or that cannot be read or written.
     """
     place = Path(folder)
@@ -31,7 +29,7 @@ def report(
     if (place / STUDY_MARK).exists():
         if against is not None:
             raise CorampError("--against: a study compares by itself; give it with a run only")
-        write_text(target, study_page(place, say))
+        write_text(target, study_page(place))
         return target
     if not (place / MARK).exists():
         raise CorampError(
@@ -39,7 +37,7 @@ def report(
             "study has written"
         )
     stored = [read_run(Path(name)) for name in (place, against) if name is not None]
-    page = run_page([_shown(s) for s in stored], stored[0].content["versions"], _repeat(stored))
+    page = run_page(stored, stored[0].content["versions"], _repeat(stored))
     write_text(target, page)
     return target
 
@@ -50,21 +48,17 @@ def replay(folder: str | Path, against: str | Path | None = None) -> Path:
     ``against`` is the folder of another run on the same arrivals, to be seen beside it. Raises
     CorampError where there is no run, arrivals differ, or it cannot be written.
     """
-    runs = [_shown(read_run(Path(name))) for name in (folder, against) if name is not None]
+    runs = [read_run(Path(name)) for name in (folder, against) if name is not None]
     target = Path(folder) / REPLAY
     write_text(target, replay_page(runs))
     return target
-
-
-def _shown(stored: StoredRun) -> ShownRun:
-    return shown_run(stored)
 
 
 def _scenario_file(name: str) -> str:
     return name if name in builtin_names("scenarios") else f"{name}.toml"
 
 
-def _repeat(stored: list[StoredRun]) -> list[str]:
+def _repeat(stored: list[RunRecords]) -> list[str]:
     """The commands that run it again; a scenario of one's own is taken to lie in NAME.toml."""
     lines = []
     for content in (run.content for run in stored):

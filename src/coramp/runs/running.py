@@ -15,6 +15,7 @@ from coramp.coordination.guard import strategy_to_run
 from coramp.coordination.timed import Timed
 from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
+from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
@@ -183,6 +184,12 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         **dict(zip(PLANNING_TIMES, strategy.planning_times_s(), strict=True)),
     }
     return tables, row
+
+
+def recorded(spec: RunSpec, options: SumoOptions | None = None) -> RunRecords:
+    """Returns the records of a run, made now; raises CorampError where it fails."""
+    tables, row = execute(spec, options)
+    return RunRecords(run_content(spec, row), row, **tables.frames())
 
 
 def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:

@@ -24,7 +24,16 @@ ROWS_AT_A_TIME = 1000
 """Runs that are held in memory as rows while the tables are made."""
 MARK = "study.json"
 PARTS = "parts"
-OURS = (MARK, PARTS, "runs.parquet", "streams.parquet", "tables.md", "capacity.png", "report.html")
+OURS = (
+    MARK,
+    PARTS,
+    "shown",
+    "runs.parquet",
+    "streams.parquet",
+    "tables.md",
+    "capacity.png",
+    "report.html",
+)
 """What a study writes into its folder."""
 
 

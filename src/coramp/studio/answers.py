@@ -9,10 +9,11 @@ from threading import Lock
 import tomli_w
 
 from coramp.errors import CorampError
+from coramp.records.run import RunRecords
 from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
-from coramp.report.page.shown import ShownRun, page_data, played
-from coramp.runs.running import RunSpec
+from coramp.report.page.shown import page_data
+from coramp.runs.running import RunSpec, recorded
 from coramp.studio.dials import NOTHING, Studio
 
 KEPT_RUNS = 16
@@ -25,7 +26,7 @@ class Answers:
 
     studio: Studio
     _lock: Lock = field(default_factory=Lock)
-    _kept: OrderedDict[str, tuple[ShownRun, str]] = field(default_factory=OrderedDict)
+    _kept: OrderedDict[str, tuple[RunRecords, str]] = field(default_factory=OrderedDict)
 
     @property
     def saved_name(self) -> str:
@@ -77,11 +78,11 @@ class Answers:
             f"# Set in coramp studio; run it by\n# {self._command(spec)}\n{tomli_w.dumps(content)}"
         )
 
-    def _run(self, spec: RunSpec) -> tuple[ShownRun, str]:
+    def _run(self, spec: RunSpec) -> tuple[RunRecords, str]:
         if spec.run_id in self._kept:
             self._kept.move_to_end(spec.run_id)
         else:
-            run = played(spec)
+            run = recorded(spec)
             text = json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
             self._kept[spec.run_id] = run, text
             while len(self._kept) > KEPT_RUNS:

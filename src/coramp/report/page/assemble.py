@@ -10,7 +10,8 @@ from typing import Any
 
 import jinja2
 
-from coramp.report.page.shown import ShownRun, page_data
+from coramp.records.run import RunRecords
+from coramp.report.page.shown import page_data
 
 LIBRARY = "uplot-1.6.32.min.js"
 STYLES = ("uplot-1.6.32.min.css", "page.css")
@@ -55,7 +56,7 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def packed(run: ShownRun) -> str:
+def packed(run: RunRecords) -> str:
     """Returns a run as the page unpacks it: base64 of gzipped JSON; the same run, the same text."""
     text = json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

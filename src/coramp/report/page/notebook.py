@@ -2,9 +2,10 @@
 
 import polars as pl
 
+from coramp.records.run import RunRecords
 from coramp.report.page.assemble import rendered
 from coramp.report.page.pages import answer, comparison_table, notes, replay_page
-from coramp.report.page.shown import ShownRun
+from coramp.report.page.shown import title_of
 from coramp.report.page.study_page import pictures_of
 from coramp.report.page.svg import picture
 from coramp.report.plan_figure import plan_figure
@@ -14,10 +15,10 @@ from coramp.studies.tables import Table, number
 PLAN_COLUMNS = ("vehicle_id", "rung", "merge_time_s", "merge_station_m", "accel_mps2")
 
 
-def run_html(run: ShownRun) -> str:
+def run_html(run: RunRecords) -> str:
     """Returns a run's summary, and its replay and time-space diagram in a frame of their own."""
     return _notebook(
-        title=f"Replay: {run.title}",
+        title=f"Replay: {title_of(run)}",
         answer=answer(run),
         notes=notes(run),
         tables=[comparison_table([run])],

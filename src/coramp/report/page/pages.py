@@ -3,16 +3,17 @@
 from collections.abc import Sequence
 
 from coramp.errors import CorampError
+from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled, packed
-from coramp.report.page.shown import ShownRun
+from coramp.report.page.shown import title_of
 from coramp.runs.running import broken_promises
 from coramp.studies.tables import Table, number
 
 RUNGS = ("free", "reach", "create", "delay", "hold")
 
 
-def replay_page(runs: Sequence[ShownRun]) -> str:
+def replay_page(runs: Sequence[RunRecords]) -> str:
     """Returns a page with the replay and the time-space diagrams of runs on the same arrivals.
 
     Raises CorampError where their arrivals differ.
@@ -21,7 +22,7 @@ def replay_page(runs: Sequence[ShownRun]) -> str:
     return assembled("replay.html", **_frame("Replay", runs))
 
 
-def run_page(runs: Sequence[ShownRun], versions: Row, repeat: Sequence[str]) -> str:
+def run_page(runs: Sequence[RunRecords], versions: Row, repeat: Sequence[str]) -> str:
     """Returns the report of the first run; others on the same arrivals stand beside it.
 
     ``versions`` are those that it was computed with, ``repeat`` the commands that do it again.
@@ -42,7 +43,7 @@ def run_page(runs: Sequence[ShownRun], versions: Row, repeat: Sequence[str]) -> 
     )
 
 
-def check_same_arrivals(runs: Sequence[ShownRun]) -> None:
+def check_same_arrivals(runs: Sequence[RunRecords]) -> None:
     """Raises CorampError where vehicles of the runs do not arrive at the same times."""
     columns = ["vehicle_id", "scheduled_s"]
     for run in runs[1:]:
@@ -54,11 +55,11 @@ def check_same_arrivals(runs: Sequence[ShownRun]) -> None:
             )
 
 
-def _frame(kind: str, runs: Sequence[ShownRun]) -> Row:
+def _frame(kind: str, runs: Sequence[RunRecords]) -> Row:
     first = runs[0]
     keys = {f"run-{k}": packed(run) for k, run in enumerate(runs)}
     return {
-        "title": f"{kind}: {' against '.join(run.title for run in runs)}",
+        "title": f"{kind}: {' against '.join(title_of(run) for run in runs)}",
         "subtitle": f"{first.scenario.name}, {first.flows}, seed {first.summary['seed']}, "
         f"{first.scenario.simulation.horizon_s:g} s of arrivals",
         "runs": keys,
@@ -70,7 +71,7 @@ def _texts(pair: tuple[str, object]) -> tuple[str, str]:
     return pair[0], str(pair[1])
 
 
-def asked_table(run: ShownRun) -> Table:
+def asked_table(run: RunRecords) -> Table:
     """Returns the road, traffic and error budget that were asked about."""
     scenario = run.scenario
     mainline, ramp, safety = scenario.mainline, scenario.ramp, scenario.safety
@@ -87,7 +88,7 @@ def asked_table(run: ShownRun) -> Table:
     return Table("What was computed", ("what", "value"), rows)
 
 
-def _errors(positioning_error_m: float, run: ShownRun) -> str:
+def _errors(positioning_error_m: float, run: RunRecords) -> str:
     safety = run.scenario.safety
     gap = f"; time gap {safety.time_gap_s:g} s" if safety.time_gap_s else ""
     if safety.standstill_gap_m:
@@ -95,14 +96,14 @@ def _errors(positioning_error_m: float, run: ShownRun) -> str:
     return f"{positioning_error_m:g} m, {safety.clock_error_s:g} s{gap}"
 
 
-def answer(run: ShownRun) -> str:
+def answer(run: RunRecords) -> str:
     """Returns in a sentence what the run says."""
     row = run.summary
     left = row["unserved"]
     served = "everyone got through" if not left else f"{left} vehicles did not get through"
     return (
-        f"With {run.title}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s on "
-        f"the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."
+        f"With {title_of(run)}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s "
+        f"on the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."
         f"{_against_the_bound(row)}"
     )
 
@@ -117,7 +118,7 @@ def _against_the_bound(row: Row) -> str:
     )
 
 
-def _difference(runs: Sequence[ShownRun]) -> list[str]:
+def _difference(runs: Sequence[RunRecords]) -> list[str]:
     if len(runs) < 2:
         return []
     one, other = runs[0].summary, runs[1].summary
@@ -127,24 +128,26 @@ def _difference(runs: Sequence[ShownRun]) -> list[str]:
         if first is not None and second is not None:
             word = "less" if first <= second else "more"
             parts.append(f"{abs(second - first):.2f} s {word} on the {stream}")
-    return [f"On the same arrivals, {runs[0].title} loses {' and '.join(parts)}."] if parts else []
+    return (
+        [f"On the same arrivals, {title_of(runs[0])} loses {' and '.join(parts)}."] if parts else []
+    )
 
 
-def notes(run: ShownRun) -> list[str]:
+def notes(run: RunRecords) -> list[str]:
     """Returns what must be said of a run before all else."""
     row, found = run.summary, []
     broken = broken_promises(row)
     if broken:
-        found.append(f"Unsafe, {run.title}: {'; '.join(broken)}.")
+        found.append(f"Unsafe, {title_of(run)}: {'; '.join(broken)}.")
     elif row["safety_violations"]:
         found.append(
-            f"{run.title}: {row['safety_violations']} pairs came nearer than the safe distance of "
-            "Eq. 1, 15 and 16, which their drivers do not know of; they are ringed below."
+            f"{title_of(run)}: {row['safety_violations']} pairs came nearer than the safe distance "
+            "of Eq. 1, 15 and 16, which their drivers do not know of; they are ringed below."
         )
     return found
 
 
-def comparison_table(runs: Sequence[ShownRun]) -> Table:
+def comparison_table(runs: Sequence[RunRecords]) -> Table:
     """Returns the figures of runs side by side."""
     lines: list[tuple[str, str, int]] = [
         ("delay of all, mean (s)", "delay_s", 2),
@@ -179,10 +182,10 @@ def comparison_table(runs: Sequence[ShownRun]) -> Table:
         for text, key, digits in lines
         if any(run.summary.get(key) is not None for run in runs)
     )
-    return Table("Figures", ("what", *(run.title for run in runs)), rows)
+    return Table("Figures", ("what", *(title_of(run) for run in runs)), rows)
 
 
-def _how_sure(runs: Sequence[ShownRun]) -> list[str]:
+def _how_sure(runs: Sequence[RunRecords]) -> list[str]:
     return [
         (
             f"This is one seed ({runs[0].summary['seed']}), one draw of arrivals and entry speeds: "

@@ -2,19 +2,16 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import polars as pl
 
 from coramp.demand.arrivals import arrivals_of
-from coramp.errors import CorampError
 from coramp.explain.decision import quantities
 from coramp.explain.story import told
+from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.style import look_of
-from coramp.runs.running import RunSpec, execute
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
 
@@ -23,73 +20,12 @@ DIGITS = (4, 4, 6, 7)
 """Of the columns of pieces: after a minute still within a millimetre of the records."""
 
 
-@dataclass(frozen=True)
-class ShownRun:
-    """The records of one run, whether just made or read from a folder.
-
-    ``motion`` are trajectories of a cooperative run and positions of any other.
-    """
-
-    scenario: Scenario
-    summary: Row
-    vehicles: pl.DataFrame
-    speeds: pl.DataFrame
-    motion: pl.DataFrame
-    decisions: pl.DataFrame | None
-    violations: pl.DataFrame | None
-
-    @property
-    def title(self) -> str:
-        """What the run is called beside others on the same arrivals."""
-        return look_of(self.summary["strategy"], self.summary["drivers"]).label
-
-    @property
-    def flows(self) -> str:
-        """The flows in words."""
-        return f"{self.summary['mainline_veh_h']:g} + {self.summary['ramp_veh_h']:g} veh/h"
+def title_of(run: RunRecords) -> str:
+    """Returns what the run is called beside others on the same arrivals."""
+    return look_of(run.content["strategy"], run.content["drivers"]).label
 
 
-def shown_run(records: Any) -> ShownRun:
-    """Returns a run as it is shown, from a ``StoredRun`` or a ``RunResult``.
-
-    Raises CorampError where there are no positions, as in runs of a coramp that kept none.
-    """
-    motion = records.trajectories if records.trajectories is not None else records.positions
-    if motion is None:
-        raise CorampError(
-            "the run tells nothing of where vehicles were: an older coramp wrote it; run it again"
-        )
-    content = records.content
-    scenario = Scenario.model_validate(content["specification"], strict=False)
-    return ShownRun(
-        scenario,
-        content["summary"],
-        records.vehicles,
-        records.speeds,
-        motion,
-        records.decisions,
-        records.violations,
-    )
-
-
-def played(spec: RunSpec) -> ShownRun:
-    """Returns a run, made now, as it is shown; raises CorampError where it fails."""
-    tables, summary = execute(spec)
-    motion = tables.trajectories if tables.trajectories is not None else tables.positions
-    if motion is None:
-        raise CorampError("the run tells nothing of where vehicles were")
-    return ShownRun(
-        spec.scenario,
-        summary,
-        tables.vehicles,
-        tables.speeds,
-        motion,
-        tables.decisions,
-        tables.violations,
-    )
-
-
-def page_data(run: ShownRun) -> Row:
+def page_data(run: RunRecords) -> Row:
     """Returns what the page's scripts take for one run; times in s, lengths in m.
 
     ``pieces`` are rows of time, station, speed and acceleration, one after the other; those of
@@ -105,7 +41,7 @@ def page_data(run: ShownRun) -> Row:
     simulation = run.scenario.simulation
     capped = any(exit_s is None for exit_s in exits_s)
     return {
-        "title": run.title,
+        "title": title_of(run),
         "strategy": run.summary["strategy"],
         "drivers": run.summary["drivers"],
         "seed": run.summary["seed"],
@@ -159,7 +95,7 @@ def _rounded(values: Iterable[float | None]) -> list[float | None]:
 
 
 def _pieces(
-    run: ShownRun, place_of: dict[str, int]
+    run: RunRecords, place_of: dict[str, int]
 ) -> tuple[list[int], list[float], list[float | None]]:
     """First piece of each vehicle, all pieces, and when each ramp vehicle changed lane."""
     place = run.motion["vehicle_id"].replace_strict(place_of, return_dtype=pl.Int64).to_numpy()
@@ -176,7 +112,7 @@ def _pieces(
     return first.tolist(), np.column_stack(columns).ravel().tolist(), merge_s
 
 
-def _lengths_m(run: ShownRun, ids: list[str]) -> list[float]:
+def _lengths_m(run: RunRecords, ids: list[str]) -> list[float]:
     arrivals = arrivals_of(run.scenario, run.summary["seed"])
     known = {arrival.vehicle_id: arrival.length_m for arrival in arrivals}
     return [known.get(name, run.scenario.vehicle.length_m) for name in ids]
@@ -184,7 +120,7 @@ def _lengths_m(run: ShownRun, ids: list[str]) -> list[float]:
 
 def _decision(
     row: Row,
-    run: ShownRun,
+    run: RunRecords,
     place_of: dict[str, int],
     templates: dict[tuple[str, str, str], int],
 ) -> Row:

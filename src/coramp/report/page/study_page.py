@@ -1,12 +1,13 @@
 """The report of a study: its answer, its tables and pictures, and what it does not know."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import polars as pl
 
 from coramp.errors import CorampError
 from coramp.records.files import read_json
+from coramp.records.run import RunRecords
 from coramp.records.run_folder import check_version
 from coramp.records.schemas import RESULT_VERSION, Row
 from coramp.report.baseline_figure import baseline_figure
@@ -16,18 +17,24 @@ from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.front_figure import front_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.pages import check_same_arrivals
-from coramp.report.page.shown import ShownRun, played
+from coramp.report.page.shown import title_of
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.style import look_of
-from coramp.runs.running import make_spec
 from coramp.studies.definition import Study, count_runs
+from coramp.studies.shown import (
+    SHOWN_DRIVERS,
+    plain,
+    read_shown,
+    same_delays,
+    shared_flows,
+    shown_rows,
+)
 from coramp.studies.statistics import estimate
 from coramp.studies.store import MARK, Store
 from coramp.studies.summary import promises, summary_tables
 from coramp.studies.tables import Table, with_interval
 
-SHOWN_DRIVERS = ("fair", "paper")
 DRAWN = {
     "paper": (
         ("Mean delay by flow, with 95 % intervals over seeds", delay_figure),
@@ -44,12 +51,11 @@ DRAWN = {
 }
 
 
-def study_page(folder: Path, say: Callable[[str], None]) -> str:
+def study_page(folder: Path) -> str:
     """Returns the report of a study, of as many of its runs as are done.
 
-    The lowest and the highest flow that all strategies share are run once more, with the first
-    seed, as studies keep no positions; ``say`` is told of each. Raises CorampError where there is
-    no study, or none of its runs went well.
+    The runs that can be watched are those of which the study has kept records. Raises CorampError
+    where there is no study, or none of its runs went well.
     """
     content = _content(folder)
     study = Study.model_validate(content["study"], strict=False)
@@ -58,14 +64,14 @@ def study_page(folder: Path, say: Callable[[str], None]) -> str:
     if good.is_empty():
         reason = f": {runs['error'][0]}" if runs.height else ""
         raise CorampError(f"{folder}: no run went well{reason}; start its coramp study again")
-    cells, packs = _cells(study, good, say)
+    cells, packs, said = _cells(folder, good)
     return assembled(
         "study.html",
         title=f"Report: study {study.name}",
         subtitle=study.description,
         asked=_asked(study, good),
         answer=_answer(good),
-        notes=list(_notes(study, runs)),
+        notes=[*_notes(study, runs), *said],
         tables=summary_tables(study, runs),
         pictures=pictures_of(study.layout, good),
         failed=_failed(runs),
@@ -120,8 +126,8 @@ def _answer(good: pl.DataFrame) -> str:
 
     Strategies with the same figures are named together.
     """
-    mainline, ramp = _shared_flows(good)[-1]
-    at = _plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
+    mainline, ramp = shared_flows(good)[-1]
+    at = plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
     main = at.filter(pl.col("drivers").is_null() | pl.col("drivers").is_in(SHOWN_DRIVERS))
     at = main if main.height else at
     losing: dict[tuple[str, ...], list[str]] = {}
@@ -142,19 +148,6 @@ def _answer(good: pl.DataFrame) -> str:
 def _lose(names: Sequence[str]) -> str:
     *others, last = names
     return f"{', '.join(others)} and {last} each lose" if others else f"{last} loses"
-
-
-def _plain(good: pl.DataFrame) -> pl.DataFrame:
-    plain = good.filter(pl.col("overrides").is_null())
-    return plain if plain.height else good
-
-
-def _shared_flows(good: pl.DataFrame) -> list[tuple[float, float]]:
-    """The flows at which there are most strategies, by their sum."""
-    who = pl.struct("strategy", "drivers").n_unique().alias("who")
-    counted = _plain(good).group_by("mainline_veh_h", "ramp_veh_h").agg(who)
-    most = counted.filter(pl.col("who") == pl.col("who").max())
-    return sorted(most.select("mainline_veh_h", "ramp_veh_h").rows(), key=sum)
 
 
 def _notes(study: Study, runs: pl.DataFrame) -> Iterator[str]:
@@ -205,59 +198,30 @@ def pictures_of(layout: str, good: pl.DataFrame) -> list[Row]:
     return [picture(text, draw(good)) for text, draw in DRAWN.get(layout, ())]
 
 
-def _cells(
-    study: Study, good: pl.DataFrame, say: Callable[[str], None]
-) -> tuple[list[Row], dict[str, str]]:
-    """The runs to be watched, by flow and by title, and each packed under its key."""
-    flows = _shared_flows(good)
+def _cells(folder: Path, good: pl.DataFrame) -> tuple[list[Row], dict[str, str], list[str]]:
+    """Returns the runs to watch by flow and title, each packed by its key, and what is said."""
+    by_flow: dict[str, list[RunRecords]] = {}
+    said: list[str] = []
+    for row in shown_rows(good):
+        run = read_shown(folder, row)
+        if run is None:
+            continue
+        if same_delays(row, run.summary):
+            by_flow.setdefault(run.flows, []).append(run)
+        else:
+            said.append(
+                f"{title_of(run)} at {run.flows} is not shown: its records have other delays than "
+                "the study"
+            )
     cells: list[Row] = []
     packs: dict[str, str] = {}
-    for mainline, ramp in dict.fromkeys((flows[0], flows[-1])):
+    for flows, runs in by_flow.items():
+        check_same_arrivals(runs)
         found: dict[str, str] = {}
-        for run in _shown(study, good, (mainline, ramp), say):
+        for run in runs:
             key = f"run-{len(packs)}"
-            packs[key], found[run.title] = packed(run), key
-        if found:
-            cells.append({"flow": f"{mainline:g} + {ramp:g} veh/h", "runs": found})
-    return cells, packs
-
-
-def _shown(
-    study: Study, good: pl.DataFrame, flows: tuple[float, float], say: Callable[[str], None]
-) -> list[ShownRun]:
-    at = _plain(good).filter(mainline_veh_h=flows[0], ramp_veh_h=flows[1])
-    at = at.filter(pl.col("seed") == pl.col("seed").min())
-    shown: list[ShownRun] = []
-    for row in at.unique(["strategy", "drivers"], maintain_order=True).iter_rows(named=True):
-        if row["overrides"] is not None or row["drivers"] not in (None, *SHOWN_DRIVERS):
-            continue
-        say(f"running {row['strategy']} at {flows[0]:g} + {flows[1]:g} veh/h, to show it")
-        again = _again(study, row)
-        if not _same_delays(row, again.summary):
-            say(f"{again.title} is not shown: run again it gives other delays than the study has")
-            continue
-        shown.append(again)
-    check_same_arrivals(shown)
-    return shown
-
-
-def _same_delays(row: Row, again: Row) -> bool:
-    """Whether a run made again is that of the study, but for what SUMO's steps round."""
-    names = [f"{stream}_delay_s" for stream in ("mainline", "ramp")]
-    pairs = [(row[name], again[name]) for name in names]
-    return all(a is b or (a is not None and b is not None and abs(a - b) < 0.02) for a, b in pairs)
-
-
-def _again(study: Study, row: Row) -> ShownRun:
-    """A run of the study once more; cooperative ones need no simulator."""
-    spec = make_spec(
-        study.scenario,
-        row["strategy"],
-        engine="sumo" if row["drivers"] else "exact",
-        mainline_veh_h=row["mainline_veh_h"],
-        ramp_veh_h=row["ramp_veh_h"],
-        drivers=row["drivers"],
-        seed=row["seed"],
-        horizon_s=study.horizon_s,
-    )
-    return played(spec)
+            packs[key], found[title_of(run)] = packed(run), key
+        cells.append({"flow": flows, "runs": found})
+    if not cells and not said:
+        said.append("The study has kept no runs to watch; start its coramp study again for them.")
+    return cells, packs, said

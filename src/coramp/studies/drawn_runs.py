@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from coramp.records.files import made_folder, staged_folder
-from coramp.records.run_folder import MARK, StoredRun, read_run, write_run
-from coramp.report.run_figures import DrawnRun
-from coramp.runs.running import RunSpec, execute, make_spec, run_content
+from coramp.records.run import RunRecords
+from coramp.records.run_folder import MARK, read_run, write_run
+from coramp.runs.running import RunSpec, make_spec, recorded
 from coramp.studies.runner import Progress
 from coramp.studies.store import Part
 
@@ -45,7 +45,7 @@ def specs_of(seeds: int, horizon_s: float | None) -> list[RunSpec]:
 
 def drawn_runs(
     folder: Path, specs: Sequence[RunSpec], report: Callable[[Progress], None]
-) -> list[DrawnRun]:
+) -> list[RunRecords]:
     """Returns the runs, from a folder each below ``folder``; those that are missing are run.
 
     ``report`` is called at the start and after every run. Raises CorampError for a run that fails
@@ -57,21 +57,7 @@ def drawn_runs(
     report(Progress(len(specs), 0, skipped, 0, 0))
     for done, spec in enumerate(missing, 1):
         with staged_folder(folder / spec.run_id, MARK) as stage:
-            tables, row = execute(spec)
-            write_run(stage, run_content(spec, row), tables.frames())
-        report(Progress(len(specs), done, skipped, 0, 0, Part(row, [])))
-    return [_drawn(spec, read_run(folder / spec.run_id)) for spec in specs]
-
-
-def _drawn(spec: RunSpec, stored: StoredRun) -> DrawnRun:
-    scenario = spec.scenario
-    return DrawnRun(
-        spec.strategy,
-        spec.drivers,
-        scenario.mainline.flow_veh_h,
-        scenario.ramp.flow_veh_h,
-        spec.seed,
-        scenario.simulation.horizon_s,
-        stored.speeds,
-        stored.decisions,
-    )
+            records = recorded(spec)
+            write_run(stage, records)
+        report(Progress(len(specs), done, skipped, 0, 0, Part(records.summary, [])))
+    return [read_run(folder / spec.run_id) for spec in specs]
