@@ -232,7 +232,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         road, ledger, reward = self._rules.road, self.loop.ledger, 0.0
         now_s = self._now * self._step_s
         for row, was_m, accel in zip(rows, before_m.tolist(), accel_mps2.tolist(), strict=False):
-            is_m, _ = station_and_speed(ledger.trajectory(row), now_s)
+            is_m, _ = station_and_speed(ledger.way(row), now_s)
             on_ramp_m = min(0.0, is_m) - min(0.0, was_m)
             wished_s = on_ramp_m / road.ramp_speed_mps
             wished_s += (is_m - was_m - on_ramp_m) / road.mainline_speed_mps

@@ -45,7 +45,7 @@ def on_the_road(*vehicles):
     for stream, station_m, speed_mps in vehicles:
         row = ledger.add(LENGTH_M, stream == "r")
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
-        ledger.commit(row, pieces, math.inf if stream == "r" else -math.inf)
+        ledger.commit(row, pieces, math.inf if stream == "r" else -math.inf, 0.0)
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))
 
 

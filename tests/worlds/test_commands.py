@@ -66,6 +66,25 @@ def test_braking_to_a_stand_commands_no_speed_below_0(speed_mps, steps, from_ste
     assert (command_table(pieces, STEP_S, from_step)[:, 1] >= 0.0).all()
 
 
+@given(st.floats(0.5, 25.0), st.integers(1, 5), st.integers(0, 9000), st.floats(0.0, 1e-9))
+def test_a_correction_up_to_a_stand_commands_no_speed_below_0(speed_mps, half, from_step, late_s):
+    # the stand lies a rounding after a step, at which the braking has it a rounding below 0
+    brake_s = 2 * half * STEP_S
+    pieces = np.array(
+        [
+            (from_step * STEP_S, -300.0, speed_mps, -speed_mps / brake_s),
+            ((from_step + 2 * half) * STEP_S + late_s, -300.0 + 0.5 * speed_mps * brake_s, 0, 0),
+        ]
+    )
+    for error_m in (-0.02, 0.02):
+        back = correction(pieces, STEP_S, from_step, error_m, speed_mps, 5)
+        assert (back[:, 1] >= 0.0).all()
+
+
+def test_standing_a_rounding_below_0_is_commanded_as_0():
+    assert command_table(np.array([[0.0, -3.0, -2.8e-19, 0.0]]), STEP_S, 0)[0, 1] == 0.0
+
+
 @given(stretches)
 def test_knots_on_the_grid_are_driven_exactly(parts):
     whole = [(accel, max(1, round(duration / STEP_S)) * STEP_S) for accel, duration in parts]

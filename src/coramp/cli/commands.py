@@ -7,6 +7,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from coramp.errors import CorampError
+from coramp.native_output import send_native_output_to_stderr
 
 WRONG, USAGE, UNSAFE, STOPPED = 1, 2, 3, 130
 DEBUG = "--debug"
@@ -359,6 +360,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     """Runs the command line and exits: 0 fine, 1 wrong value or failed run, 2 usage, 3 unsafe."""
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     debug = DEBUG in given
+    if arguments is None:
+        send_native_output_to_stderr()
     try:
         code = app([word for word in given if word != DEBUG], standalone_mode=False)
     except Exception as error:

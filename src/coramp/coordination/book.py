@@ -12,21 +12,26 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
+    TIME,
     intercept_range_m,
+    piece_at,
     station_and_speed,
     time_at_station,
 )
 from coramp.vehicles.fleet import Fleet, committed
 
-ROWS, PIECES, LIVE, BLOCKS = range(4)
-"""Places in ``Book.used``."""
+ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
+"""Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
 
 
 class Book(NamedTuple):
     """All commitments, with room to spare; ``used`` tells how much of what is in use.
 
-    The first fields are those of ``Fleet``. ``exit_s`` is when a row's front leaves the zone,
-    infinity while it would stop before. Block b is a commitment of ``block_row[b]``.
+    The first fields are those of ``Fleet``. ``way_first`` and ``way_count`` are all that a row
+    drives from its last decision on: before the pieces of its last commitment come those of earlier
+    ones that it drives until that takes over, which is later by the actuation delay. ``exit_s`` is
+    when a row's front leaves the zone, infinity while it would stop before. Block b is a commitment
+    of ``block_row[b]``.
     """
 
     pieces: FloatArray
@@ -37,6 +42,8 @@ class Book(NamedTuple):
     lowest_m: FloatArray
     highest_m: FloatArray
     exit_s: FloatArray
+    way_first: IntArray
+    way_count: IntArray
     adjustable: BoolArray
     live: IntArray
     block_row: IntArray
@@ -56,12 +63,14 @@ def empty_book(rows: int, pieces: int) -> Book:
         np.full(rows, -math.inf),
         np.full(rows, math.inf),
         np.full(rows, math.inf),
+        np.zeros(rows, np.int64),
+        np.zeros(rows, np.int64),
         np.zeros(rows, np.bool_),
         np.zeros(rows, np.int64),
         np.zeros(2 * rows, np.int64),
         np.zeros(2 * rows, np.int64),
         np.zeros(2 * rows, np.int64),
-        np.zeros(4, np.int64),
+        np.zeros(5, np.int64),
     )
 
 
@@ -80,21 +89,36 @@ def with_room(book: Book, commitments: int = 1) -> Book:
 
 @kernel
 def is_full(used: IntArray, rows: int, blocks: int, pieces: int, commitments: int = 1) -> bool:
-    """Returns whether so much room may be too little for one more row, or so many commitments."""
+    """Returns whether so much room may be too little for one more row, or so many commitments.
+
+    What leads to a commitment is part of the way before, and so no longer than that.
+    """
+    most = MAX_PIECES + used[MOST_PIECES]
     return bool(
         used[ROWS] >= rows
         or used[BLOCKS] + commitments > blocks
-        or used[PIECES] + commitments * MAX_PIECES > pieces
+        or used[PIECES] + commitments * most > pieces
     )
 
 
 @kernel
 def fleet_of(book: Book) -> Fleet:
-    """Returns all commitments as planners read them."""
+    """Returns all commitments as planners read them: from when the last command takes effect."""
+    return _as_fleet(book, book.first_piece, book.piece_count)
+
+
+@kernel
+def ways_of(book: Book) -> Fleet:
+    """Returns what everyone drives from now on, with what leads to the last commitments."""
+    return _as_fleet(book, book.way_first, book.way_count)
+
+
+@kernel
+def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet:
     return Fleet(
         book.pieces,
-        book.first_piece,
-        book.piece_count,
+        first_piece,
+        piece_count,
         book.length_m,
         book.merge_time_s,
         book.lowest_m,
@@ -124,28 +148,51 @@ def write_commitment(
     row: int,
     pieces: FloatArray,
     merge_time_s: float,
+    now_s: float,
     cruise_speed_mps: float,
     zone_end_m: float,
 ) -> None:
-    """Records that ``row`` follows ``pieces`` from their first time on."""
-    start, count = book.used[PIECES], len(pieces)
-    book.pieces[start : start + count] = pieces
+    """Records at ``now_s`` that ``row`` follows ``pieces`` from their first time on.
+
+    Until then it drives on as committed before. Whoever enters meanwhile must reckon with that.
+    """
     entering = book.piece_count[row] == 0
-    book.first_piece[row] = start
-    book.piece_count[row] = count
+    start = book.used[PIECES]
+    lead = 0 if entering else _write_lead_in(book, row, now_s, pieces[0, TIME])
+    first, count = start + lead, len(pieces)
+    book.pieces[first : first + count] = pieces
+    book.first_piece[row], book.piece_count[row] = first, count
+    book.way_first[row], book.way_count[row] = start, lead + count
+    way = book.pieces[start : first + count]
     book.merge_time_s[row] = merge_time_s
-    book.exit_s[row] = time_at_station(pieces, zone_end_m)
+    book.exit_s[row] = time_at_station(way, zone_end_m)
     if merge_time_s < math.inf:
-        from_s = max(pieces[0, 0], merge_time_s)
-        lowest_m, highest_m = intercept_range_m(pieces, from_s, cruise_speed_mps)
+        from_s = max(now_s, merge_time_s)
+        lowest_m, highest_m = intercept_range_m(way, from_s, cruise_speed_mps)
         book.lowest_m[row], book.highest_m[row] = lowest_m, highest_m
     block = book.used[BLOCKS]
-    book.block_row[block], book.block_first[block], book.block_count[block] = row, start, count
+    book.block_row[block], book.block_first[block], book.block_count[block] = row, first, count
     book.used[BLOCKS] += 1
-    book.used[PIECES] += count
+    book.used[PIECES] += lead + count
+    book.used[MOST_PIECES] = max(book.used[MOST_PIECES], lead + count)
     if entering:
         book.live[book.used[LIVE]] = row
         book.used[LIVE] += 1
+
+
+@kernel
+def _write_lead_in(book: Book, row: int, now_s: float, until_s: float) -> int:
+    """Writes what ``row`` drives from ``now_s`` until ``until_s``; returns how many pieces."""
+    start = book.used[PIECES]
+    first, count = book.way_first[row], book.way_count[row]
+    under_way = piece_at(book.pieces[first : first + count], now_s)
+    lead = 0
+    for k in range(first + under_way, first + count):
+        if book.pieces[k, TIME] >= until_s:
+            break
+        book.pieces[start + lead] = book.pieces[k]
+        lead += 1
+    return lead
 
 
 @kernel
@@ -162,7 +209,7 @@ def strike_exited(book: Book, time_s: float) -> None:
 @kernel
 def states_of_live(book: Book, time_s: float) -> tuple[FloatArray, FloatArray]:
     """Returns stations (m) and speeds (m/s) of the live vehicles as they promised them."""
-    fleet = fleet_of(book)
+    fleet = ways_of(book)
     stations_m = np.empty(len(fleet.live))
     speeds_mps = np.empty(len(fleet.live))
     for k in range(len(fleet.live)):

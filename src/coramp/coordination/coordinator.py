@@ -16,6 +16,7 @@ from coramp.coordination.admission import (
     plan_moving_up,
     undecided_in_lane_order,
 )
+from coramp.coordination.book import ways_of
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
     DONE,
@@ -186,7 +187,7 @@ class Coordinator:
 
     def decide_now(self, step: int) -> None:
         """Has every ramp vehicle on the road planned at ``step``, wherever it is, front first."""
-        rows = undecided_in_lane_order(self.ledger.fleet, step * self._step_s)
+        rows = undecided_in_lane_order(ways_of(self.ledger.book), step * self._step_s)
         for row in rows.tolist():
             self._due_step.pop(row, None)
             self._decide((row,), step)
@@ -258,7 +259,7 @@ class Coordinator:
         self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
-        self.ledger.commit(row, pieces, merge_time_s)
+        self.ledger.commit(row, pieces, merge_time_s, step * self._step_s)
         if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
             self._due_step.pop(row, None)
         self._announce(row, step)
@@ -270,7 +271,7 @@ class Coordinator:
 
     def _goes_on_to_station(self, row: int, step: int) -> bool:
         """Whether a vehicle whose stop lay before its decision station can now go on towards it."""
-        station_m, _ = station_and_speed(self.ledger.trajectory(row), step * self._step_s)
+        station_m, _ = station_and_speed(self.ledger.way(row), step * self._step_s)
         if station_m >= self._rules.road.decision_station_m or not self._moves_up(row, step):
             return False
         self._plan_when_due(row, self.ledger.trajectory(row), step + 1)

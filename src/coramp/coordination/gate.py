@@ -13,7 +13,7 @@ from coramp.checker.checker import Change, Vehicles, examine
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED
 from coramp.coordination.admission import decision_due_s, plan_entry
-from coramp.coordination.book import LIVE, ROWS, Book, add_row, fleet_of, is_full, strike_exited
+from coramp.coordination.book import LIVE, ROWS, Book, add_row, is_full, strike_exited, ways_of
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
 from coramp.road.rules import Rules, unpacked
@@ -189,7 +189,7 @@ def enter(
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     length_m, speed_mps = gate.length_m[arrival], gate.speed_mps[arrival]
     pieces = plan_entry(
-        fleet_of(book),
+        ways_of(book),
         length_m,
         on_ramp,
         time_s,
@@ -208,7 +208,7 @@ def enter(
         return code
     road = rules.road
     merge_s = book.merge_time_s[row]
-    write(book, row, pieces, merge_s, road.mainline_speed_mps, road.mainline_end_m)
+    write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
     gate.row_arrival[row], gate.row_step[row] = arrival, step
     if on_ramp:
         due_s = decision_due_s(pieces, road.decision_station_m)
@@ -235,16 +235,27 @@ def examine_entry(
         start,
         np.zeros(1, np.int64),
     )
-    return examine(vehicles_of(book), change, start[0, 0], bounds).code
+    return examine(_from_now_on(book), change, start[0, 0], bounds).code
 
 
 @kernel
 def vehicles_of(book: Book) -> Vehicles:
-    """Returns what is committed, as the checker reads it."""
+    """Returns what is committed, as the checker reads it, from when the last command acts."""
+    return _as_vehicles(book, book.first_piece, book.piece_count)
+
+
+@kernel
+def _from_now_on(book: Book) -> Vehicles:
+    """Returns what everyone drives from now on, which matters to whoever enters now."""
+    return _as_vehicles(book, book.way_first, book.way_count)
+
+
+@kernel
+def _as_vehicles(book: Book, first: IntArray, count: IntArray) -> Vehicles:
     return Vehicles(
         book.pieces,
-        book.first_piece,
-        book.piece_count,
+        first,
+        count,
         book.length_m,
         book.merge_time_s,
         book.live[: book.used[LIVE]],

@@ -70,11 +70,11 @@ class Ledger:
             raise ValueError("only the newest row without a commitment can be withdrawn")
         self.book.used[ROWS] -= 1
 
-    def commit(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
-        """Records that ``row`` follows ``pieces`` from their first time on."""
+    def commit(self, row: int, pieces: FloatArray, merge_time_s: float, now_s: float) -> None:
+        """Records at ``now_s`` that ``row`` follows ``pieces`` from their first time on."""
         self.make_room()
         write_commitment(
-            self.book, row, pieces, merge_time_s, self._cruise_speed_mps, self._zone_end_m
+            self.book, row, pieces, merge_time_s, now_s, self._cruise_speed_mps, self._zone_end_m
         )
 
     def reports(self, time_s: float) -> Reports:
@@ -97,6 +97,14 @@ class Ledger:
         return float(self.book.length_m[row])
 
     def trajectory(self, row: int) -> FloatArray:
-        """Returns what ``row`` has committed to, shape (n, 4); empty before it enters."""
+        """Returns what ``row`` committed to last, shape (n, 4); empty before it enters.
+
+        It begins when that takes over: later than the decision by the actuation delay.
+        """
         first = self.book.first_piece[row]
         return self.book.pieces[first : first + self.book.piece_count[row]]
+
+    def way(self, row: int) -> FloatArray:
+        """Returns what ``row`` drives from its last decision on, shape (n, 4)."""
+        first = self.book.way_first[row]
+        return self.book.pieces[first : first + self.book.way_count[row]]

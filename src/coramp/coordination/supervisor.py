@@ -66,13 +66,12 @@ def drive_all(
     """Commits what is safe, and returns what that is; the book has room for all."""
     done = np.zeros(len(rows), np.bool_)
     rules = unpacked(packed_rules)
-    from_s = now_s + rules.control.actuation_delay_s
     known_m = foremost_unknown_m(now_s, fastest_entry_mps, rules)
     for _ in range(MOST_PASSES):
         progress = False
         for k in range(len(rows)):
             if not done[k] and _drive_one(
-                book, rows[k], wishes[k, 0], wishes[k, 1], merges[k], from_s, known_m, rules, bounds
+                book, rows[k], wishes[k, 0], wishes[k, 1], merges[k], now_s, known_m, rules, bounds
             ):
                 done[k] = progress = True
         if not progress:
@@ -87,28 +86,29 @@ def _drive_one(
     accel_mps2: float,
     hold_s: float,
     merge: bool,
-    from_s: float,
+    now_s: float,
     known_m: float,
     rules: Rules,
     bounds: Bounds,
 ) -> bool:
+    from_s = now_s + rules.control.actuation_delay_s
     fleet = fleet_of(book)
     out = np.empty((MAX_PIECES, 4))
     merge_s = fleet.merge_time_s[row]
     if merge_s <= from_s:
         n = hold_then_cruise(fleet, row, accel_mps2, hold_s, from_s, rules, out)
-        return _commit_if_safe(book, row, out[:n], merge_s, from_s, rules, bounds)
+        return _commit_if_safe(book, row, out[:n], merge_s, now_s, rules, bounds)
     if merge or merge_s < math.inf:
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
             change_s = _lane_change_s(out[:n], rules)
-            if _commit_if_safe(book, row, out[:n], change_s, from_s, rules, bounds):
+            if _commit_if_safe(book, row, out[:n], change_s, now_s, rules, bounds):
                 return True
     if merge_s < math.inf:
         return False
     stop_m = _place_to_stop_m(fleet, row, from_s, rules)
     n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
-    return _commit_if_safe(book, row, out[:n], math.inf, from_s, rules, bounds)
+    return _commit_if_safe(book, row, out[:n], math.inf, now_s, rules, bounds)
 
 
 @kernel
@@ -148,12 +148,13 @@ def _commit_if_safe(
     row: int,
     pieces: FloatArray,
     merge_s: float,
-    from_s: float,
+    now_s: float,
     rules: Rules,
     bounds: Bounds,
 ) -> bool:
     if len(pieces) == 0:
         return False
+    from_s, road = now_s + rules.control.actuation_delay_s, rules.road
     station_m, speed_mps = station_and_speed(committed(fleet_of(book), row), from_s)
     change = Change(
         np.array([row]),
@@ -165,5 +166,5 @@ def _commit_if_safe(
     )
     if examine(vehicles_of(book), change, from_s, bounds).code != ACCEPTED:
         return False
-    write(book, row, pieces, merge_s, rules.road.mainline_speed_mps, rules.road.mainline_end_m)
+    write(book, row, pieces, merge_s, now_s, road.mainline_speed_mps, road.mainline_end_m)
     return True

@@ -39,12 +39,12 @@ def command_table(pieces: FloatArray, step_s: float, from_step: int) -> FloatArr
         out[n, 0] = step
         out[n, 3], out[n, 4] = station_and_speed(pieces, now_s)
         if k == last:
-            out[n, 1], out[n, 2] = pieces[last, SPEED], 0
+            out[n, 1], out[n, 2] = forwards_mps(pieces[last, SPEED]), 0
             return out[: n + 1]
         whole = math.floor(piece_end_s(pieces, k) / step_s + ON_GRID) - step
         steps = max(1, whole)
         _, speed_mps = station_and_speed(pieces, now_s + steps * step_s)
-        out[n, 1] = 0.0 if -ROUNDING_MPS < speed_mps < 0.0 else speed_mps
+        out[n, 1] = forwards_mps(speed_mps)
         out[n, 2] = 0 if whole >= 1 and pieces[k, ACCEL] == 0.0 else steps
         n += 1
         step += steps
@@ -75,5 +75,11 @@ def correction(
     if between_mps < 0.0:
         return out[:0]
     out[0] = np.array((float(step), between_mps, float(h), now_m, now_mps))
-    out[1] = np.array((float(step + h), then_mps, float(h), middle_m, middle_mps))
+    out[1] = np.array((float(step + h), forwards_mps(then_mps), float(h), middle_m, middle_mps))
     return out
+
+
+@kernel
+def forwards_mps(speed_mps: float) -> float:
+    """Returns the speed to command: 0 where rounding has it below that as a plan comes to rest."""
+    return 0.0 if -ROUNDING_MPS < speed_mps < 0.0 else speed_mps
