@@ -12,13 +12,14 @@ from coramp.demand import demand_above_limit, demands_above_limit
 from coramp.engines.sumo.engine import SumoOptions
 from coramp.errors import CorampError
 from coramp.explanation import Quantity, quantities
-from coramp.files import made_folder, staged_folder
+from coramp.files import made_folder
 from coramp.metrics.tables import Row
 from coramp.planning import PlannedSnapshot, plan_snapshot
 from coramp.plots import PlanPlots, RunPlots, StudyPlots
-from coramp.run_folder import MARK, StoredRun, run_content, write_run
+from coramp.run_folder import SUMO, StoredRun, not_replaceable, run_content, write_run
 from coramp.running import RunSpec, broken_promises, engine_checked, execute, make_spec
 from coramp.snapshots import load_snapshot
+from coramp.staging import staged_folder
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
 from coramp.studies.cluster import connected
@@ -209,8 +210,8 @@ def run(
         notice(line)
     if out is None:
         return _executed(spec, SumoOptions(gui=gui))
-    with staged_folder(Path(out), MARK) as stage:
-        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
+    with staged_folder(Path(out), not_replaceable) as stage:
+        result = _executed(spec, SumoOptions(stage / SUMO if keep_sumo else None, gui))
         write_run(stage, spec, result.frames, result.summary)
     return result
 

@@ -8,11 +8,9 @@ from coramp.files import write_text
 from coramp.report.page.pages import replay_page, run_page
 from coramp.report.page.shown import ShownRun, shown_run
 from coramp.report.page.study_page import study_page
-from coramp.run_folder import MARK, StoredRun, read_run
+from coramp.run_folder import MARK, REPLAY, REPORT, StoredRun, read_run
 from coramp.studies.store import MARK as STUDY_MARK
 from coramp.toml_files import builtin_names
-
-REPORT, REPLAY = "report.html", "replay.html"
 
 
 def report(

@@ -1,20 +1,28 @@
 """What a run leaves in its folder, and reading it back."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import polars as pl
 
+from coramp.engines.sumo.engine import KEPT_FILES
 from coramp.errors import CorampError
 from coramp.files import read_json, write_json, write_parquet
 from coramp.metrics.schemas import RESULT_VERSION
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, finite_or_none, versions
 from coramp.scenario import Scenario
+from coramp.unfinished import is_unfinished
 
 MARK = "run.json"
 TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
+REPORT, REPLAY = "report.html", "replay.html"
+SUMO = "sumo"
+"""The folder of SUMO's own files in that of a run."""
+OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in TABLES)})
+NAMED_AT_MOST = 3
+"""So many foreign files are named in an error."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,49 @@ def write_run(folder: Path, spec: RunSpec, frames: Mapping[str, pl.DataFrame], r
         if name in TABLES:
             write_parquet(folder / f"{name}.parquet", frame)
     write_json(folder / MARK, run_content(spec, row))
+
+
+def not_replaceable(folder: Path) -> str | None:
+    """Says why a folder must not be replaced by a run, and what to do; None where it may be.
+
+    It may be where all that it holds is one run: whatever coramp did not write stays.
+    """
+    content = sorted(entry.name for entry in folder.iterdir())
+    if not _describes_a_run(folder / MARK):
+        what = "a study" if "study.json" in content else f"other files ({content[0]})"
+        return f"holds {what}; give another or an empty folder"
+    foreign = [name for name in content if not _is_ours(folder / name)]
+    if not foreign:
+        return None
+    more = len(foreign) - NAMED_AT_MOST
+    names = ", ".join(foreign[:NAMED_AT_MOST]) + (f" and {more} more" if more > 0 else "")
+    return (
+        f"holds a run and what coramp did not write ({names}); move that away, or give another "
+        "folder"
+    )
+
+
+def _describes_a_run(mark: Path) -> bool:
+    try:
+        content = read_json(mark)
+    except CorampError:
+        return False
+    needed = {"run_id", "specification", "summary"}
+    return isinstance(content, dict) and content.get("kind") == "run" and needed <= content.keys()
+
+
+def _is_ours(entry: Path) -> bool:
+    if is_unfinished(entry.name):
+        return True
+    if entry.is_symlink():
+        return False
+    if entry.name == SUMO and entry.is_dir():
+        return all(_is_file_of(inner, KEPT_FILES) for inner in entry.iterdir())
+    return _is_file_of(entry, OURS)
+
+
+def _is_file_of(entry: Path, names: Collection[str]) -> bool:
+    return entry.name in names and entry.is_file() and not entry.is_symlink()
 
 
 def read_run(folder: Path) -> StoredRun:

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from coramp.files import made_folder, staged_folder
+from coramp.files import made_folder
 from coramp.report.run_figures import DrawnRun
-from coramp.run_folder import MARK, StoredRun, read_run, write_run
+from coramp.run_folder import MARK, StoredRun, not_replaceable, read_run, write_run
 from coramp.running import RunSpec, execute, make_spec
+from coramp.staging import staged_folder
 from coramp.studies.runner import Progress
 from coramp.studies.store import Part
 
@@ -56,7 +57,7 @@ def drawn_runs(
     skipped = len(specs) - len(missing)
     report(Progress(len(specs), 0, skipped, 0, 0))
     for done, spec in enumerate(missing, 1):
-        with staged_folder(folder / spec.run_id, MARK) as stage:
+        with staged_folder(folder / spec.run_id, not_replaceable) as stage:
             tables, row = execute(spec)
             frames = tables.frames()
             write_run(stage, spec, frames, row)

@@ -20,6 +20,7 @@ from coramp.metrics.schemas import RESULT_VERSION, RUNS, STREAMS
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, versions
 from coramp.studies.definition import Study
+from coramp.unfinished import is_unfinished
 
 ROWS_AT_A_TIME = 1000
 """Runs that are held in memory as rows while the tables are made."""
@@ -74,12 +75,17 @@ class Store:
             return
         if self.folder.exists() and not self.folder.is_dir():
             raise CorampError(f"{self.folder}: is a file; give a folder")
-        if self.folder.exists() and any(f.name not in OURS for f in self.folder.iterdir()):
+        if self.folder.exists() and not self._is_ours():
             raise CorampError(
                 f"{self.folder}: holds other files and no study; give another or an empty folder"
             )
         made_folder(self.folder)
         write_json(mark, content)
+
+    def _is_ours(self) -> bool:
+        """Whether all in the folder is a study's; tables alone may be somebody else's."""
+        names = {entry.name for entry in self.folder.iterdir() if not is_unfinished(entry.name)}
+        return not names or (PARTS in names and names <= set(OURS))
 
     def _description(self) -> Row | None:
         """What the folder says of itself, None where that is missing or no JSON.

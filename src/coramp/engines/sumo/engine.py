@@ -44,6 +44,10 @@ PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collisi
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
 LOOPS = "loops.add.xml"
+COPIED_FILES = ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml")
+NETWORK, COMMAND = "net.net.xml", "command.txt"
+KEPT_FILES = (*COPIED_FILES, NETWORK, COMMAND, LOOPS)
+"""What ``SumoOptions.keep_in`` may hold in the end."""
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
 
 
@@ -247,19 +251,19 @@ class _Files:
         if self._keep_in is None:
             return
         self._keep_in.mkdir(parents=True, exist_ok=True)
-        shutil.copy(network_file(self._plan), self._keep_in / "net.net.xml")
-        for name in ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml"):
+        shutil.copy(network_file(self._plan), self._keep_in / NETWORK)
+        for name in COPIED_FILES:
             shutil.copy(self._folder / name, self._keep_in / name)
         if self._loops(Path(LOOPS)):
             shutil.copy(self._folder / LOOPS, self._keep_in / LOOPS)
         command = [
-            *("sumo", "--net-file", "net.net.xml", "--route-files", "routes.rou.xml"),
+            *("sumo", "--net-file", NETWORK, "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
             *self._loops(Path(LOOPS)),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *(("--step-method.ballistic",) if self._ballistic else ()),
         ]
-        (self._keep_in / "command.txt").write_text(" ".join(command) + "\n")
+        (self._keep_in / COMMAND).write_text(" ".join(command) + "\n")
 
     def collisions(self) -> int:
         """Returns how many pairs of vehicles SUMO saw collide."""
