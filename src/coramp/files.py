@@ -62,11 +62,15 @@ def _sweep_once(folder: Path) -> None:
 def read_json(path: Path) -> Any:
     """Returns the content of a JSON file; raises CorampError where it is missing or damaged."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_json)
     except FileNotFoundError:
         raise CorampError(f"{path}: no such file; give a folder that coramp has written") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise CorampError(f"{path}: cannot be read: {error}; run again to write it anew") from error
+
+
+def _no_json(constant: str) -> None:
+    raise ValueError(f"{constant} is no JSON")
 
 
 def made_folder(path: Path) -> Path:

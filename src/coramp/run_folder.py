@@ -13,10 +13,11 @@ from coramp.metrics.schemas import RESULT_VERSION
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, finite_or_none, versions
 from coramp.scenario import Scenario
+from coramp.stored_checks import SCHEMAS, checked_content, checked_frame
 from coramp.unfinished import is_unfinished
 
 MARK = "run.json"
-TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
+TABLES = tuple(SCHEMAS)
 REPORT, REPLAY = "report.html", "replay.html"
 SUMO = "sumo"
 """The folder of SUMO's own files in that of a run."""
@@ -140,13 +141,15 @@ def read_run(folder: Path) -> StoredRun:
     if not isinstance(content, dict) or content.get("kind") != "run" or "summary" not in content:
         raise CorampError(f"{folder / MARK}: does not describe a run; run again to write it anew")
     check_version(folder, content)
+    content = checked_content(folder / MARK, content)
     frames = {}
     for name in TABLES:
         path = folder / f"{name}.parquet"
         try:
-            frames[name] = pl.read_parquet(path) if path.exists() else None
+            frame = pl.read_parquet(path) if path.exists() else None
         except (OSError, pl.exceptions.PolarsError) as error:
             raise CorampError(f"{path}: cannot be read: {error}; run again") from error
+        frames[name] = None if frame is None else checked_frame(path, frame, SCHEMAS[name])
     vehicles, speeds = frames["vehicles"], frames["speeds"]
     if vehicles is None or speeds is None:
         raise CorampError(f"{folder}: is not complete; run again with the same --out")

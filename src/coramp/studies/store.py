@@ -164,13 +164,14 @@ def _part_in(path: Path) -> Part | None:
     """The part in a file, None if it is missing, damaged or of another run than its name says."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        if content["sha256"] != _checksum(content["run"], content["streams"]):
+        run, streams = content["run"], content["streams"]
+        if content["sha256"] != _checksum(run, streams) or run["run_id"] != path.stem:
             return None
-        if content["run"]["run_id"] != path.stem:
+        if run.keys() != RUNS.keys() or any(row.keys() != STREAMS.keys() for row in streams):
             return None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
+    return Part(_decoded(run), [_decoded(row) for row in streams])
 
 
 def _checksum(run: Row, streams: list[Row]) -> str:

@@ -7,7 +7,7 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.files import read_json
-from coramp.metrics.schemas import RESULT_VERSION
+from coramp.metrics.schemas import RESULT_VERSION, RUNS
 from coramp.metrics.tables import Row
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
@@ -19,9 +19,11 @@ from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import ShownRun, played
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
+from coramp.report.study_folder import checked_study
 from coramp.report.style import look_of
 from coramp.run_folder import check_version
 from coramp.running import make_spec
+from coramp.stored_checks import checked_frame
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.statistics import estimate
 from coramp.studies.store import MARK, Store
@@ -53,7 +55,7 @@ def study_page(folder: Path, say: Callable[[str], None]) -> str:
     no study, or none of its runs went well.
     """
     content = _content(folder)
-    study = Study.model_validate(content["study"], strict=False)
+    study = checked_study(folder / MARK, content)
     runs = _runs(folder, study)
     good = runs.filter(status="ok")
     if good.is_empty():
@@ -96,7 +98,7 @@ def _runs(folder: Path, study: Study) -> pl.DataFrame:
         store = Store(folder, study)
         return store.frames(store.everything())[0]
     try:
-        return pl.read_parquet(path)
+        return checked_frame(path, pl.read_parquet(path), RUNS)
     except (OSError, pl.exceptions.PolarsError) as error:
         raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
 
