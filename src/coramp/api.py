@@ -10,8 +10,9 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.explain.decision import Quantity, quantities
-from coramp.records.files import made_folder, staged_folder
-from coramp.records.run_folder import MARK, write_run
+from coramp.records.files import made_folder
+from coramp.records.run_folder import SUMO, not_replaceable, write_run
+from coramp.records.staging import staged_folder
 from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
 from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
 from coramp.runs.planning import PlannedSnapshot, plan_snapshot
@@ -175,8 +176,8 @@ def run(
         notice(line)
     if out is None:
         return _executed(spec, SumoOptions(gui=gui))
-    with staged_folder(Path(out), MARK) as stage:
-        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
+    with staged_folder(Path(out), not_replaceable) as stage:
+        result = _executed(spec, SumoOptions(stage / SUMO if keep_sumo else None, gui))
         write_run(stage, result)
     return result
 

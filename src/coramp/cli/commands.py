@@ -6,8 +6,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from coramp.cli.native_output import send_native_output_to_stderr
 from coramp.errors import CorampError
-from coramp.native_output import send_native_output_to_stderr
 
 WRONG, USAGE, UNSAFE, STOPPED = 1, 2, 3, 130
 DEBUG = "--debug"
@@ -143,7 +143,13 @@ def run(
 ) -> None:
     """Run one scenario."""
     from coramp.api import run as run_scenario
-    from coramp.cli.console import print_json, print_run, tell_of_compiling, tell_of_demand, working
+    from coramp.cli.console import (
+        print_json,
+        print_run,
+        tell_of_compiling,
+        tell_of_demand,
+        working,
+    )
     from coramp.scenarios.toml_files import parse_overrides
 
     tell_of_compiling()

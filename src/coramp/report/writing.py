@@ -5,13 +5,11 @@ from pathlib import Path
 from coramp.errors import CorampError
 from coramp.records.files import write_text
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import MARK, read_run
+from coramp.records.run_folder import MARK, REPLAY, REPORT, read_run
 from coramp.report.page.pages import replay_page, run_page
 from coramp.report.page.study_page import study_page
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.store import MARK as STUDY_MARK
-
-REPORT, REPLAY = "report.html", "replay.html"
 
 
 def report(

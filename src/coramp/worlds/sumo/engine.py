@@ -19,6 +19,7 @@ from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.outcome import Outcome, Pieces
+from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.worlds.outcomes import (
@@ -43,7 +44,6 @@ from coramp.worlds.sumo.traits import traits_of
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
-LOOPS = "loops.add.xml"
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
 
 
@@ -216,10 +216,10 @@ class _Files:
         (self._folder / "routes.rou.xml").write_text(text)
 
     def write_loops(self, text: str) -> None:
-        (self._folder / LOOPS).write_text(text)
+        (self._folder / SUMO_LOOPS).write_text(text)
 
     def _loops(self, name: Path) -> list[str]:
-        return ["--additional-files", str(name)] if (self._folder / LOOPS).exists() else []
+        return ["--additional-files", str(name)] if (self._folder / SUMO_LOOPS).exists() else []
 
     def options(self) -> list[str]:
         """Returns SUMO's options, output files included."""
@@ -229,7 +229,7 @@ class _Files:
             *("--route-files", str(folder / "routes.rou.xml")),
             *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
-            *self._loops(folder / LOOPS),
+            *self._loops(folder / SUMO_LOOPS),
         ]
         if self._ballistic:
             result.append("--step-method.ballistic")
@@ -247,19 +247,19 @@ class _Files:
         if self._keep_in is None:
             return
         self._keep_in.mkdir(parents=True, exist_ok=True)
-        shutil.copy(network_file(self._plan), self._keep_in / "net.net.xml")
-        for name in ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml"):
+        shutil.copy(network_file(self._plan), self._keep_in / SUMO_NETWORK)
+        for name in SUMO_COPIES:
             shutil.copy(self._folder / name, self._keep_in / name)
-        if self._loops(Path(LOOPS)):
-            shutil.copy(self._folder / LOOPS, self._keep_in / LOOPS)
+        if self._loops(Path(SUMO_LOOPS)):
+            shutil.copy(self._folder / SUMO_LOOPS, self._keep_in / SUMO_LOOPS)
         command = [
-            *("sumo", "--net-file", "net.net.xml", "--route-files", "routes.rou.xml"),
+            *("sumo", "--net-file", SUMO_NETWORK, "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
-            *self._loops(Path(LOOPS)),
+            *self._loops(Path(SUMO_LOOPS)),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *(("--step-method.ballistic",) if self._ballistic else ()),
         ]
-        (self._keep_in / "command.txt").write_text(" ".join(command) + "\n")
+        (self._keep_in / SUMO_COMMAND).write_text(" ".join(command) + "\n")
 
     def collisions(self) -> int:
         """Returns how many pairs of vehicles SUMO saw collide."""
