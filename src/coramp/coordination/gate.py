@@ -9,13 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.checker.checker import Change, Vehicles, examine
+from coramp.checker.checker import Entry, examine_entry
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED
+from coramp.checker.record import Record, has_room, note_entry
 from coramp.coordination.admission import decision_due_s, plan_entry
-from coramp.coordination.book import LIVE, ROWS, Book, add_row, is_full, strike_exited, ways_of
+from coramp.coordination.book import ROWS, Book, add_row, is_full, strike_exited, ways_of
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
+from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
 
@@ -140,7 +142,12 @@ def _next_tries(gate: Gate, stream: int, step: int) -> None:
 
 @kernel
 def admit_until(
-    book: Book, gate: Gate, last_step: int, packed_rules: FloatArray, bounds: Bounds
+    book: Book,
+    record: Record,
+    gate: Gate,
+    last_step: int,
+    packed_rules: FloatArray,
+    bounds: Bounds,
 ) -> Stop:
     """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
 
@@ -155,11 +162,13 @@ def admit_until(
             return Stop(DONE, step, -1, ACCEPTED)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
+                if is_full(
+                    book.used, len(book.live), len(book.block_row), len(book.pieces)
+                ) or not has_room(record, MAX_PIECES):
                     return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
-                code = enter(book, gate, arrival, start_m, step, rules, bounds)
+                code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
                 if code == ACCEPTED:
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
@@ -175,6 +184,7 @@ def admit_until(
 @kernel
 def enter(
     book: Book,
+    record: Record,
     gate: Gate,
     arrival: int,
     station_m: float,
@@ -200,13 +210,12 @@ def enter(
     )
     if len(pieces) == 0:
         return WAITS
-    row = add_row(book, length_m, on_ramp)
-    start = np.array([[time_s, station_m, speed_mps]])
-    code = examine_entry(book, row, pieces, start, bounds)
+    entry = Entry(time_s, station_m, speed_mps, length_m, on_ramp)
+    code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
-        book.used[ROWS] -= 1
         return code
-    road = rules.road
+    row, road = add_row(book, length_m, on_ramp), rules.road
+    note_entry(record, length_m, book.merge_time_s[row], pieces, bounds.zone_end_m)
     merge_s = book.merge_time_s[row]
     write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
     gate.row_arrival[row], gate.row_step[row] = arrival, step
@@ -220,43 +229,3 @@ def enter(
 def first_step_from(time_s: float, step_s: float) -> int:
     """Returns the first step at or after a time."""
     return int(np.ceil(time_s / step_s - 1e-6))
-
-
-@kernel
-def examine_entry(
-    book: Book, row: int, pieces: FloatArray, start: FloatArray, bounds: Bounds
-) -> int:
-    """Returns the checker's code for a vehicle that enters; start: time, station, speed."""
-    change = Change(
-        np.array([row]),
-        np.array([len(pieces)]),
-        pieces.reshape((1, len(pieces), 4)),
-        np.array([book.merge_time_s[row]]),
-        start,
-        np.zeros(1, np.int64),
-    )
-    return examine(_from_now_on(book), change, start[0, 0], bounds).code
-
-
-@kernel
-def vehicles_of(book: Book) -> Vehicles:
-    """Returns what is committed, as the checker reads it, from when the last command acts."""
-    return _as_vehicles(book, book.first_piece, book.piece_count)
-
-
-@kernel
-def _from_now_on(book: Book) -> Vehicles:
-    """Returns what everyone drives from now on, which matters to whoever enters now."""
-    return _as_vehicles(book, book.way_first, book.way_count)
-
-
-@kernel
-def _as_vehicles(book: Book, first: IntArray, count: IntArray) -> Vehicles:
-    return Vehicles(
-        book.pieces,
-        first,
-        count,
-        book.length_m,
-        book.merge_time_s,
-        book.live[: book.used[LIVE]],
-    )

@@ -11,7 +11,6 @@ from coramp.coordination.book import (
     LIVE,
     ROWS,
     Book,
-    add_row,
     empty_book,
     states_of_live,
     with_room,
@@ -58,17 +57,6 @@ class Ledger:
     def make_room(self, commitments: int = 1) -> None:
         """Makes sure that one more row and so many commitments fit into the book."""
         self.book = with_room(self.book, commitments)
-
-    def add(self, length_m: float, on_ramp: bool) -> int:
-        """Makes room for a cooperative vehicle that is about to enter; returns its row."""
-        self.make_room()
-        return int(add_row(self.book, length_m, on_ramp))
-
-    def withdraw(self, row: int) -> None:
-        """Takes back the last ``add`` of a vehicle that could not enter."""
-        if row != len(self) - 1 or self.book.piece_count[row]:
-            raise ValueError("only the newest row without a commitment can be withdrawn")
-        self.book.used[ROWS] -= 1
 
     def commit(self, row: int, pieces: FloatArray, merge_time_s: float, now_s: float) -> None:
         """Records at ``now_s`` that ``row`` follows ``pieces`` from their first time on."""
