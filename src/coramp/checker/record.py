@@ -79,9 +79,9 @@ def has_room(record: Record, most_pieces: int) -> bool:
 @kernel
 def way_of(record: Record, row: int) -> Way:
     """Returns what a row drives from its last command on, and until that takes effect."""
-    first, count = record.places[row]
-    length_m, merge_s, _ = record.traits[row]
-    return Way(record.pieces[first : first + count], length_m, merge_s)
+    first = record.places[row, FIRST]
+    pieces = record.pieces[first : first + record.places[row, COUNT]]
+    return Way(pieces, record.traits[row, LENGTH], record.traits[row, MERGE])
 
 
 @kernel
@@ -107,7 +107,7 @@ def note_command(
     Until then it drives what it was told before, which is kept in front of them.
     """
     start = record.used[PIECES]
-    first, count = record.places[row]
+    first, count = record.places[row, FIRST], record.places[row, COUNT]
     kept = 0
     for k in range(first, first + count):
         begins_s = record.pieces[k, 0]
