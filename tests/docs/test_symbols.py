@@ -9,7 +9,7 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
-from coramp.records.outcome import schemas
+from coramp.records import schemas
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.snapshots import Snapshot
