@@ -6,7 +6,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from coramp.errors import CorampError
+from coramp.errors import CorampError, printable
 
 WRONG, USAGE, UNSAFE, STOPPED = 1, 2, 3, 130
 DEBUG = "--debug"
@@ -64,7 +64,7 @@ def strategies(json: Json = False) -> None:
 
     origins = {name: origin_of(name) for name in registered()}
     texts = {
-        name: s.summary if origins[name] == OURS else f"{s.summary} [{origins[name]}]"
+        name: s.summary if origins[name] == OURS else printable(f"{s.summary} [{origins[name]}]")
         for name, s in registered().items()
     }
     found = {"strategies": texts}
@@ -395,5 +395,5 @@ def _report(error: Exception) -> int:
             text = f"unexpected {type(error).__name__}: {error}; add {DEBUG} to see where"
             code, messages = WRONG, (text,)
     for message in messages:
-        print(f"Error: {' '.join(str(message).split())}", file=sys.stderr)
+        print(f"Error: {printable(str(message))}", file=sys.stderr)
     return code

@@ -136,7 +136,7 @@ def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[st
     """Returns a copy of the data with dotted keys set; ``origins`` says who set each."""
     result = _copied(data)
     for dotted, value in overrides.items():
-        _check_override(dotted, value, origins[dotted])
+        _check_override(dotted, value, origins.get(dotted, ""))
         *parents, last = key_parts(data, dotted)
         table = result
         for parent in parents:

@@ -8,7 +8,7 @@ import numpy as np
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.core.fleet import MAX_CHANGED
 from coramp.core.trajectory import MAX_PIECES
-from coramp.errors import CorampError
+from coramp.errors import CorampError, printable
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -100,7 +100,7 @@ def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Dec
 
 
 def _told(error: BaseException) -> str:
-    text = " ".join(str(error).split())
+    text = printable(str(error))
     return f"raises {type(error).__name__}: {text}" if text else f"raises {type(error).__name__}"
 
 

@@ -16,7 +16,7 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.files import made_folder, read_json, write_json, write_parquet, write_text
-from coramp.metrics.schemas import RESULT_VERSION, RUNS, STREAMS
+from coramp.metrics.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAMS
 from coramp.metrics.tables import Row
 from coramp.running import RunSpec, versions
 from coramp.studies.definition import Study
@@ -167,7 +167,9 @@ def _part_in(path: Path) -> Part | None:
         run, streams = content["run"], content["streams"]
         if content["sha256"] != _checksum(run, streams) or run["run_id"] != path.stem:
             return None
-        if run.keys() != RUNS.keys() or any(row.keys() != STREAMS.keys() for row in streams):
+        if not {"status", *RUN_KEYS} <= run.keys() <= RUNS.keys():
+            return None
+        if any(not {"run_id", "stream"} <= row.keys() <= STREAMS.keys() for row in streams):
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
