@@ -1,5 +1,6 @@
 """Writing reports and replays of what lies in a folder."""
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from coramp.report.page.shown import ShownRun, shown_run
 from coramp.report.page.study_page import study_page
 from coramp.run_folder import MARK, REPLAY, REPORT, StoredRun, read_run
 from coramp.studies.store import MARK as STUDY_MARK
-from coramp.toml_files import builtin_names
+from coramp.toml_files import builtin_names, override_text
+
+HORIZON = "simulation.horizon_s"
 
 
 def report(
@@ -67,15 +70,20 @@ def _repeat(stored: list[StoredRun]) -> list[str]:
     lines = []
     for content in (run.content for run in stored):
         horizon_s = content["specification"]["simulation"]["horizon_s"]
-        parts = [
-            f"coramp run {_scenario_file(content['scenario'])} --strategy {content['strategy']}",
-            f"--engine {content['engine']}",
-            f"--mainline {content['mainline_veh_h']:g} --ramp {content['ramp_veh_h']:g}",
-            f"--seed {content['seed']} --horizon {horizon_s:g}",
+        words = [
+            *("coramp", "run", _scenario_file(content["scenario"])),
+            *("--strategy", content["strategy"], "--engine", content["engine"]),
+            *("--mainline", f"{content['mainline_veh_h']:.12g}"),
+            *("--ramp", f"{content['ramp_veh_h']:.12g}"),
+            *("--seed", str(content["seed"]), "--horizon", f"{horizon_s:.12g}"),
         ]
         if content["drivers"]:
-            parts.append(f"--drivers {content['drivers']}")
-        parts += [f"--set {setting}" for setting in (content["overrides"] or "").split()]
-        lines.append(" ".join(parts))
+            words += ["--drivers", content["drivers"]]
+        for key, value in content["settings"].items():
+            if key != HORIZON:  # is given above
+                words += ["--set", override_text(key, value)]
+        lines.append(shlex.join(words))
+        if content["overrides"] and not content["settings"]:
+            lines.append(f"# an older coramp ran it, with {content['overrides']}")
     lines.append("# run.json has the full specification of each run")
     return lines

@@ -1,6 +1,7 @@
 """Reading TOML files: built-in or the user's, with overrides, into models, with clear errors."""
 
 import difflib
+import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -118,6 +119,28 @@ def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
             raise CorampError(f"--set: {text}: has a line break; allowed is one KEY=VALUE")
         overrides[key.strip()] = _value_of(key.strip(), value)
     return overrides
+
+
+def override_text(key: str, value: Any) -> str:
+    """Returns the text ``KEY=VALUE`` that ``parse_overrides`` makes these of."""
+    if isinstance(value, str) and value == value.strip() and _value_of(key, value) == value:
+        return f"{key}={value}"  # a word that needs no quotes
+    return f"{key}={_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case list() | tuple():
+            return f"[{', '.join(map(_toml, value))}]"
+        case dict():
+            inner = (f"{json.dumps(str(name))} = {_toml(v)}" for name, v in value.items())
+            return f"{{{', '.join(inner)}}}"
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case _:
+            return repr(value)
 
 
 def _value_of(key: str, text: str) -> Any:
