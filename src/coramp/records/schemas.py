@@ -151,7 +151,9 @@ RUNS: Schema = {
     "planning_median_s": pl.Float64,
     "planning_p95_s": pl.Float64,
     **_LATER_METRICS,
+    "settings": pl.String,
 }
+"""``settings`` are the overrides as JSON, a dotted key each; ``overrides`` shows them."""
 PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
 MEASURED = ("wall_s", *PLANNING_TIMES)
 """Columns that hold wall times: all that differs between equal runs."""

@@ -1,5 +1,6 @@
 """What a run's folder must hold to be read: files may have been edited, or be of another origin."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ def checked_content(mark: Path, content: Row) -> Row:
     if problem:
         raise CorampError(f"{mark}: {problem}; run again to write it anew")
     summary = {**dict.fromkeys(RUNS), **content["summary"]}
-    return {**content, "summary": summary}
+    return {"settings": {}, **content, "summary": summary}
 
 
 def _problem(content: Row) -> str | None:
@@ -66,6 +67,7 @@ def _problem(content: Row) -> str | None:
         or _wrong_values(content, keys, "")
         or _missing(summary, asked, "summary.")
         or _wrong_values(summary, RUNS, "summary.")
+        or _wrong_settings(content, summary)
         or _wrong_specification(content.get("specification"))
     )
 
@@ -85,6 +87,18 @@ def _wrong_values(values: Row, schema: Schema, within: str) -> str | None:
             return f"{within}{key}: {value!r} cannot be; allowed is {allowed}"
         if key == "seed" and not 0 <= int(value or 0) <= _LARGEST_SEED:
             return f"{within}{key}: {value} is out of range; allowed is 0 to {_LARGEST_SEED}"
+    return None
+
+
+def _wrong_settings(content: Row, summary: Row) -> str | None:
+    if not isinstance(content.get("settings", {}), dict):
+        return f"settings: {content['settings']!r} is not an object; allowed is one of dotted keys"
+    try:
+        found = json.loads(summary.get("settings") or "{}")
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        return "summary.settings: is not the JSON of an object; allowed is one of dotted keys"
     return None
 
 

@@ -77,10 +77,21 @@ class RunSpec:
             "overrides": " ".join(f"{key}={value}" for key, value in self.overrides) or None,
         }
 
+    @property
+    def settings(self) -> str | None:
+        """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
+        return json.dumps(dict(self.overrides), default=str) if self.overrides else None
+
     def as_data(self) -> Row:
         """Returns the specification as plain data."""
         content = self.scenario.model_dump(mode="json")
-        return {"run_id": self.run_id, **self.keys, "specification": content}
+        settings = json.loads(self.settings or "{}")
+        return {
+            "run_id": self.run_id,
+            **self.keys,
+            "settings": settings,
+            "specification": content,
+        }
 
 
 def make_spec(
@@ -182,6 +193,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         **tables.metrics,
         "wall_s": time.perf_counter() - started,
         **dict(zip(PLANNING_TIMES, strategy.planning_times_s(), strict=True)),
+        "settings": spec.settings,
     }
     return tables, row
 
@@ -203,6 +215,7 @@ def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
         **nothing,
         "wall_s": wall_s,
         **dict.fromkeys(PLANNING_TIMES),
+        "settings": spec.settings,
     }
 
 

@@ -1,6 +1,7 @@
 """Reading TOML files: built-in or the user's, with overrides, into models, with clear errors."""
 
 import difflib
+import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -120,6 +121,28 @@ def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
     return overrides
 
 
+def override_text(key: str, value: Any) -> str:
+    """Returns the text ``KEY=VALUE`` that ``parse_overrides`` makes these of."""
+    if isinstance(value, str) and value == value.strip() and _value_of(key, value) == value:
+        return f"{key}={value}"  # a word that needs no quotes
+    return f"{key}={_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case list() | tuple():
+            return f"[{', '.join(map(_toml, value))}]"
+        case dict():
+            inner = (f"{json.dumps(str(name))} = {_toml(v)}" for name, v in value.items())
+            return f"{{{', '.join(inner)}}}"
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case _:
+            return repr(value)
+
+
 def _value_of(key: str, text: str) -> Any:
     blamed = f"--set: {shortened(key)}"
     try:
@@ -136,7 +159,7 @@ def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[st
     """Returns a copy of the data with dotted keys set; ``origins`` says who set each."""
     result = _copied(data)
     for dotted, value in overrides.items():
-        _check_override(dotted, value, origins[dotted])
+        _check_override(dotted, value, origins.get(dotted, ""))
         *parents, last = key_parts(data, dotted)
         table = result
         for parent in parents:

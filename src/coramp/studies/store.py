@@ -22,7 +22,7 @@ from coramp.records.files import (
     write_parquet,
     write_text,
 )
-from coramp.records.schemas import RESULT_VERSION, RUNS, STREAMS, Row
+from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAMS, Row
 from coramp.records.unfinished import is_unfinished
 from coramp.runs.running import RunSpec, versions
 from coramp.studies.definition import Study
@@ -181,7 +181,9 @@ def _part_in(path: Path) -> Part | None:
         run, streams = content["run"], content["streams"]
         if content["sha256"] != _checksum(run, streams) or run["run_id"] != path.stem:
             return None
-        if run.keys() != RUNS.keys() or any(row.keys() != STREAMS.keys() for row in streams):
+        if not {"status", *RUN_KEYS} <= run.keys() <= RUNS.keys():
+            return None
+        if any(not {"run_id", "stream"} <= row.keys() <= STREAMS.keys() for row in streams):
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
