@@ -29,6 +29,7 @@ from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
 from coramp.studies.tables import Table
+from coramp.unserved import unserved_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -184,7 +185,8 @@ def run(
     """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
-    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit.
+    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit,
+    and afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
@@ -208,15 +210,19 @@ def run(
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if out is None:
-        return _executed(spec, SumoOptions(gui=gui))
+        return _executed(spec, SumoOptions(gui=gui), notice)
     with staged_folder(Path(out), MARK) as stage:
-        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
+        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui), notice)
         write_run(stage, spec, result.frames, result.summary)
     return result
 
 
-def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
+def _executed(
+    spec: RunSpec, options: SumoOptions, notice: Callable[[str], None] | None
+) -> RunResult:
     tables, row = execute(spec, options)
+    if notice is not None and (line := unserved_line(tables.outcome)) is not None:
+        notice(line)
     return RunResult(
         spec,
         row,

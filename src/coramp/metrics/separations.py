@@ -29,6 +29,8 @@ from coramp.core.trajectory import (
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""
 MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS = range(5)
+EXACT_M = 1e-8
+"""What rounding may take from a distance that the checker has measured to 1e-9 m."""
 FIGURES, NOTED = 5, 4
 """How many figures there are, and how many numbers tell of one violation."""
 
@@ -159,7 +161,7 @@ def _end_pair(
     ahead, behind, length_m = driven(lane, front), driven(lane, rear), _length_m(lane, front)
     margin_m, least_s = smallest_margin_m(ahead, length_m, behind, start_s, end_s, safety)
     extremes[MARGIN] = min(extremes[MARGIN], margin_m)
-    if margin_m < 0.0:
+    if margin_m < -EXACT_M:
         _note_violation(extremes, least_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
     ttc_s, drac_mps2 = closing_extremes(ahead, length_m, behind, start_s, end_s)
     extremes[TTC] = min(extremes[TTC], ttc_s)
@@ -196,7 +198,7 @@ def _look_at_merge(
         distance_m = own_m - _length_m(lane, merging) - other_m
     along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
     margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
-    if margin_m < 0.0:
+    if margin_m < -EXACT_M:
         _note_violation(extremes, now_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
     severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)

@@ -88,7 +88,8 @@ class LeastEffort:
             committed(fleet, situation.subject), situation.from_s
         )
         duration_s = merge_s - situation.from_s
-        v0 = rules.road.mainline_speed_mps
+        v0, motion = rules.road.mainline_speed_mps, rules.motion
+        most_mps2 = min(motion.comfort_mps2, motion.ramp_acceleration_mps2)
         if duration_s <= 2.0 * self.hold_s:
             return None
         periods = min(MOST_PERIODS, math.ceil(duration_s / self.hold_s))
@@ -98,7 +99,7 @@ class LeastEffort:
             limit_mps = np.where(np.arange(periods) < on_ramp, rules.road.ramp_limit_mps, v0)
             limit_mps[-1] = v0
             accel_mps2 = constrained_optimum(
-                merge_m - start_m, duration_s, start_mps, v0, rules.motion.comfort_mps2, limit_mps
+                merge_m - start_m, duration_s, start_mps, v0, most_mps2, limit_mps
             )
             if accel_mps2 is None:
                 return None
