@@ -116,6 +116,8 @@ def make_spec(
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
+        raise CorampError(loaded.drift_problem)
     if is_metered(chosen) and loaded.signal_problem:
         raise CorampError(loaded.signal_problem)
     population = None

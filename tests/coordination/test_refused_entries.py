@@ -1,12 +1,17 @@
 """Entries that the checker refuses: told once, and tried again when something has changed."""
 
+import numpy as np
+
 from coramp.audit.reasons import REASONS, TOO_HARD
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.examination import Examiner
 from coramp.coordination.plant import Arrival
+from coramp.core.driving import hold_then_merge
+from coramp.core.trajectory import ACCEL, MAX_PIECES
 from coramp.loading import load_scenario
 from coramp.running import execute, make_spec
 from coramp.strategies.registry import strategy_named
+from tests.core import fleet_of, pieces
 from tests.situations import named
 
 RULES = load_scenario("paper").rules()
@@ -38,16 +43,17 @@ def test_it_is_tried_again_once_something_has_changed():
 
 def test_the_least_effort_is_within_a_weak_acceleration_on_the_ramp():
     for strategy in ("fifo-optimal-control", "milp-sequence"):
-        settings = {"motion.ramp_acceleration_mps2": 2.1, "simulation.drain_s": 300.0}
+        settings = {f"motion.{key}_acceleration_mps2": 0.6 for key in ("ramp", "free")}
         spec = make_spec("paper", strategy, engine="exact", horizon_s=120, overrides=settings)
         _, row = execute(spec)
         assert (row["refused_plans"], row["unserved"]) == (0, 0)
 
 
-def test_steered_vehicles_keep_to_a_weak_acceleration_on_the_lane():
-    settings = {"motion.ramp_acceleration_mps2": 1.2, "motion.free_acceleration_mps2": 1.2}
-    spec = make_spec("paper", "virtual-platoon", engine="exact", horizon_s=60, overrides=settings)
-    tables, row = execute(spec)
-    lane = tables.trajectories.filter(lane="acceleration")
-    assert lane["accel_mps2"].max() <= 1.2 + 1e-6
-    assert row["unserved"] == 0
+def test_a_held_acceleration_keeps_to_a_weak_one_on_the_lane():
+    weak = RULES._replace(motion=RULES.motion._replace(ramp_acceleration_mps2=1.2))
+    weak = weak._replace(motion=weak.motion._replace(free_acceleration_mps2=1.0))
+    out = np.empty((MAX_PIECES, 4))
+    fleet = fleet_of((pieces(0.0, 20.0, 14.0), 12.0, True))
+    n = hold_then_merge(fleet, 0, 1.5, 2.0, 1.0, weak, out)
+    assert n > 1
+    assert out[:n, ACCEL].max() == 1.2
