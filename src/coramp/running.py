@@ -14,7 +14,12 @@ from typing import Any
 from coramp.coordination.guard import strategy_to_run
 from coramp.coordination.timed import Timed
 from coramp.engines.exact.engine import run_exact
-from coramp.engines.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
+from coramp.engines.sumo.engine import (
+    LARGEST_PLAN_ERROR_M,
+    SumoOptions,
+    run_cooperative,
+    run_uncontrolled,
+)
 from coramp.errors import CorampError
 from coramp.loading import drivers_checked, load_scenario
 from coramp.metrics.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS
@@ -26,7 +31,6 @@ from coramp.toml_files import key_parts
 
 ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
-LARGEST_PLAN_ERROR_M = 0.05
 FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
 OPTIONS = {
     "mainline.flow_veh_h": "--mainline",
