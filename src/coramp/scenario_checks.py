@@ -56,10 +56,8 @@ def _motion_problems(scenario: "Scenario") -> list[str]:
     least = float(getattr(motion, hardest))
     if motion.comfort_mps2 >= least:
         return []
-    return [
-        f"motion.comfort_mps2: {motion.comfort_mps2:g} is below motion.{hardest}, which all plans "
-        f"use; allowed is {least:g} to 10 m/s2"
-    ]
+    line = f"motion.comfort_mps2: {motion.comfort_mps2:g} is below motion.{hardest}, which all"
+    return [f"{line} plans use; allowed is {least:g} to 10 m/s2"]
 
 
 def _place_problems(scenario: "Scenario") -> list[str]:

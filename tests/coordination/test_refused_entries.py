@@ -19,7 +19,7 @@ LAST_STEP = 1200
 
 
 def run_with(comfort_mps2, *arrivals):
-    """Runs arrivals (stream, time in s, speed) past a checker that allows less than planners use."""
+    """Runs arrivals (stream, time, speed) past a checker that allows less than planners use."""
     listed = [Arrival("", s == "r", round(t / 0.1), v, 5.0) for s, t, v in arrivals]
     loop = Coordinator(strategy_named("mainline-priority")(), RULES, named(listed), 20.0)
     loop._examiner = Examiner(loop._examiner.bounds._replace(comfort_mps2=comfort_mps2))

@@ -17,7 +17,9 @@ def test_a_run_that_leaves_vehicles_unserved_says_so_on_stderr():
 
 def test_the_notice_is_given_to_python_as_well():
     lines = []
-    result = coramp.run("paper", engine="exact", horizon_s=60, overrides=CUT_OFF, notice=lines.append)
+    result = coramp.run(
+        "paper", engine="exact", horizon_s=60, overrides=CUT_OFF, notice=lines.append
+    )
     assert lines[-1].startswith(f"{result.summary['unserved']} of ")
 
 
@@ -33,9 +35,8 @@ def test_comfort_below_what_all_plans_use_is_refused():
             settings += ["--set", "motion.slow_down_mps2=1.0"]
         told = invoke("run", "paper", "--engine", "exact", *settings)
         assert_refused(told)
-        assert told.errors == [
-            f"Error: --set: motion.comfort_mps2: 1.7 is below motion.{key}_mps2, which all plans "
-            "use; allowed is 1.8 to 10 m/s2"
-        ]
+        (line,) = told.errors
+        assert line.startswith(f"Error: --set: motion.comfort_mps2: 1.7 is below motion.{key}_mps2")
+        assert line.endswith("which all plans use; allowed is 1.8 to 10 m/s2")
     same = {"motion.comfort_mps2": 2.0, "motion.slow_down_mps2": 2.0}
     assert load_scenario("paper", same).motion.comfort_mps2 == 2.0
