@@ -151,7 +151,8 @@ def run(
     """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
-    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit.
+    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit,
+    and afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
@@ -175,15 +176,17 @@ def run(
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if out is None:
-        return _executed(spec, SumoOptions(gui=gui))
+        return _executed(spec, SumoOptions(gui=gui), notice)
     with staged_folder(Path(out), not_replaceable) as stage:
-        result = _executed(spec, SumoOptions(stage / SUMO if keep_sumo else None, gui))
+        result = _executed(spec, SumoOptions(stage / SUMO if keep_sumo else None, gui), notice)
         write_run(stage, result)
     return result
 
 
-def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
-    records = recorded(spec, options)
+def _executed(
+    spec: RunSpec, options: SumoOptions, notice: Callable[[str], None] | None
+) -> RunResult:
+    records = recorded(spec, options, notice or (lambda _: None))
     return RunResult(**{f.name: getattr(records, f.name) for f in fields(records)}, spec=spec)
 
 

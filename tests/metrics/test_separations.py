@@ -49,6 +49,24 @@ def test_a_slower_follower_has_a_margin_alone():
     assert (found["min_ttc_s"], found["max_drac_mps2"]) == (None, 0.0)
 
 
+@pytest.mark.parametrize(("short_m", "counted"), [(1e-12, 0), (1e-9, 0), (1e-6, 1), (1e-3, 1)])
+def test_rounding_is_no_violation_and_a_thousandth_of_a_millimetre_is(short_m, counted):
+    rear_m = 95.0 - eq_1(20.0, 20.0) + short_m
+    found = figures(steady("m1", 100.0, 20.0, 5.0), steady("m2", rear_m, 20.0, 5.0))
+    assert found["min_margin_m"] == pytest.approx(-short_m, abs=1e-10)
+    assert found["safety_violations"] == counted
+
+
+@pytest.mark.parametrize(("short_m", "counted"), [(1e-9, 0), (1e-6, 1)])
+def test_rounding_is_no_violation_at_a_lane_change_either(short_m, counted):
+    ahead_m = 100.0 + 5.0 + eq_15(19.0, 20.0) - short_m
+    found = figures(
+        steady("m1", ahead_m - 20.0, 20.0, 1.5),
+        steady("r1", 100.0 - 19.0, 19.0, 1.5, merge_s=1.0),
+    )
+    assert found["safety_violations"] == counted
+
+
 def test_the_order_of_vehicles_in_the_records_does_not_matter():
     cars = [
         steady("m1", 100.0, 10.0, 2.0),

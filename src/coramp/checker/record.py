@@ -50,20 +50,47 @@ def empty_record(rows: int, pieces: int) -> Record:
 
 
 def with_room(record: Record, commands: int, most_pieces: int) -> Record:
-    """Returns the record, or a larger one where a row and so many commands do not fit.
+    """Returns the record, or another one where a row and so many commands do not fit.
 
-    ``most_pieces`` is the most that one command may have.
+    ``most_pieces`` is the most that one command may have. What vehicles drove that are off the road
+    is forgotten first, so that the record of a long run stays small.
     """
     rows, pieces = len(record.live), len(record.pieces)
     in_use, filled, _, longest = record.used.tolist()
-    needed = filled + commands * (longest + most_pieces)
-    if in_use < rows and needed <= pieces:
+    more = commands * (longest + most_pieces)
+    if in_use < rows and filled + more <= pieces:
         return record
-    rows = rows if in_use < rows else 2 * rows
-    larger = empty_record(rows, max(pieces, 2 * needed))
-    for old, new in zip(record, larger, strict=True):
-        new[: len(old)] = old
-    return larger
+    on_road = _pieces_on_road(record)
+    while on_road + more > pieces // 2:
+        pieces *= 2
+    other = empty_record(rows if in_use < rows else 2 * rows, pieces)
+    _copy_live(record, other)
+    return other
+
+
+@kernel
+def _pieces_on_road(record: Record) -> int:
+    """Returns how many pieces those who are on the road have."""
+    count = 0
+    for row in record.live[: record.used[LIVE]]:
+        count += record.places[row, COUNT]
+    return count
+
+
+@kernel
+def _copy_live(record: Record, other: Record) -> None:
+    """Copies everything but the pieces of those who are off the road into an empty record."""
+    rows, live = record.used[ROWS], record.used[LIVE]
+    other.traits[:rows] = record.traits[:rows]
+    other.live[:live] = record.live[:live]
+    at = 0
+    for row in record.live[:live]:
+        first, count = record.places[row, FIRST], record.places[row, COUNT]
+        other.pieces[at : at + count] = record.pieces[first : first + count]
+        other.places[row, FIRST], other.places[row, COUNT] = at, count
+        at += count
+    other.used[:] = record.used
+    other.used[PIECES] = at
 
 
 @kernel

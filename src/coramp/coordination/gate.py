@@ -11,10 +11,19 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Entry, examine_entry
 from coramp.checker.distances import Bounds
-from coramp.checker.reasons import ACCEPTED
+from coramp.checker.reasons import ACCEPTED, TOO_NEAR, TOO_NEAR_AT_MERGE
 from coramp.checker.record import Record, has_room, note_entry
 from coramp.coordination.admission import decision_due_s, plan_entry
-from coramp.coordination.book import ROWS, Book, add_row, is_full, strike_exited, ways_of
+from coramp.coordination.book import (
+    BLOCKS,
+    LIVE,
+    ROWS,
+    Book,
+    add_row,
+    is_full,
+    strike_exited,
+    ways_of,
+)
 from coramp.coordination.book import write_commitment as write
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import MAX_PIECES
@@ -25,6 +34,8 @@ NEVER = 1 << 60
 WAITS = -1
 DONE, FULL, REFUSED = range(3)
 """Why ``admit_until`` came back: nobody else is due, the book is full, the checker refused."""
+ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
+"""Columns of ``Gate.refused``."""
 
 
 class Gate(NamedTuple):
@@ -35,6 +46,8 @@ class Gate(NamedTuple):
     a row of the book: its arrival, the step at which it entered, the one at which it is planned.
     ``asks`` is True where the strategy is asked about each vehicle as it enters. A mainline vehicle
     waits outside rather than brake below ``slowest_mps`` as it enters. Both have one entry.
+    ``refused[s]`` is whom of a stream the checker refused last and why, and how many commitments
+    and vehicles on the road there were then.
     """
 
     step: IntArray
@@ -50,6 +63,7 @@ class Gate(NamedTuple):
     row_due_step: IntArray
     asks: BoolArray
     slowest_mps: FloatArray
+    refused: IntArray
 
 
 class Stop(NamedTuple):
@@ -82,6 +96,7 @@ def gate_for(arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float
         np.full(len(arrivals), NEVER),
         np.array([asks]),
         np.array([slowest_mps]),
+        np.full((2, 4), -1),
     )
 
 
@@ -151,8 +166,9 @@ def admit_until(
 ) -> Stop:
     """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
 
-    Whoever cannot enter safely tries again at the next step, and holds up those behind. Whoever has
-    left the zone by then is off the live list.
+    Whoever cannot enter safely tries again at the next step, and holds up those behind. Whom the
+    checker refuses for its own plan's sake tries again once others have planned, come or gone; a
+    refusal is told once. Whoever has left the zone by then is off the live list.
     """
     rules = unpacked(packed_rules)
     while True:
@@ -167,6 +183,9 @@ def admit_until(
                 ) or not has_room(record, MAX_PIECES):
                     return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
+                if _is_as_refused(book, gate, stream, arrival):
+                    gate.try_step[stream] = step + 1
+                    continue
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
                 code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
                 if code == ACCEPTED:
@@ -177,8 +196,30 @@ def admit_until(
                         last_step = min(last_step, step)
                 else:
                     gate.try_step[stream] = step + 1
-                    if code != WAITS:
+                    if code != WAITS and _is_news(book, gate, stream, arrival, code):
                         return Stop(REFUSED, step, arrival, code)
+
+
+@kernel
+def _is_as_refused(book: Book, gate: Gate, stream: int, arrival: int) -> bool:
+    """Returns whether nothing has changed since an arrival was refused for its own plan's sake."""
+    last = gate.refused[stream]
+    return bool(
+        last[ARRIVAL] == arrival
+        and last[CODE] not in (TOO_NEAR, TOO_NEAR_AT_MERGE)
+        and last[COMMITMENTS] == book.used[BLOCKS]
+        and last[ON_ROAD] == book.used[LIVE]
+    )
+
+
+@kernel
+def _is_news(book: Book, gate: Gate, stream: int, arrival: int, code: int) -> bool:
+    """Notes a refusal; returns whether the arrival has not been refused for that just before."""
+    last = gate.refused[stream]
+    news = last[ARRIVAL] != arrival or last[CODE] != code
+    last[ARRIVAL], last[CODE] = arrival, code
+    last[COMMITMENTS], last[ON_ROAD] = book.used[BLOCKS], book.used[LIVE]
+    return bool(news)
 
 
 @kernel

@@ -32,7 +32,8 @@ class Ledger:
     """Holds all commitments of a run. ``book`` is for kernels; it is replaced as it grows."""
 
     def __init__(self, cruise_speed_mps: float, zone_end_m: float, vehicles: int = 0) -> None:
-        self.book: Book = empty_book(max(16, vehicles), 8 * max(16, vehicles))
+        rows = max(16, vehicles)
+        self.book: Book = empty_book(rows, 2 * rows, 8 * rows)
         self._cruise_speed_mps = cruise_speed_mps
         self._zone_end_m = zone_end_m
 
@@ -47,7 +48,10 @@ class Ledger:
 
     @property
     def history(self) -> Iterator[Commitment]:
-        """All commitments ever made, in their order."""
+        """All commitments ever made, in their order.
+
+        Of those that another one replaced a very long run keeps only what was driven.
+        """
         book = self.book
         for block in range(book.used[BLOCKS]):
             first = book.block_first[block]
