@@ -132,7 +132,7 @@ def test_the_reference_has_signatures_and_docstrings(built):
         ],
         "checker": [
             "coramp.checker.checker.examine",
-            "Returns whether the change may be committed",
+            "Returns whether a change may be committed",
         ],
     }.items():
         text = (folder / "reference" / f"{page}.html").read_text(encoding="utf-8")

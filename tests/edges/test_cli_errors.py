@@ -508,7 +508,7 @@ def test_a_run_that_fails_leaves_no_folder_and_keeps_the_one_before(here, monkey
     def broken(*_):
         raise CorampError("SUMO: out of petrol")
 
-    monkeypatch.setattr("coramp.api.execute", broken)
+    monkeypatch.setattr("coramp.runs.running.execute", broken)
     for out in ("r", "new"):
         assert refused(here, "run", "paper", "--horizon", "5", "--out", out) == [
             "Error: SUMO: out of petrol"
@@ -631,7 +631,7 @@ def test_stopping_a_run_by_hand_is_told(here, monkeypatch):
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("coramp.api.execute", stopped)
+    monkeypatch.setattr("coramp.runs.running.execute", stopped)
     (line,) = refused(here, "run", "paper", "--out", "r", code=130)
     assert line.startswith("Error: stopped")
 
@@ -640,7 +640,7 @@ def test_an_error_of_coramp_itself_is_one_line_too(here, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("a\nb")
 
-    monkeypatch.setattr("coramp.api.execute", broken)
+    monkeypatch.setattr("coramp.runs.running.execute", broken)
     told = invoke("run", "paper", "--out", "r")
     assert told.code == 1
     (line,) = told.errors

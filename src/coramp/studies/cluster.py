@@ -6,6 +6,7 @@ from typing import Any
 
 import joblib as untyped_joblib
 
+from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
 from coramp.records.schemas import RESULT_VERSION
 from coramp.runs.running import versions
@@ -28,7 +29,13 @@ def connected(address: str) -> Iterator[int]:
         raise CorampError("--cluster: Dask is not installed; pip install coramp[dask]") from None
     distributed: Any = untyped_distributed
     try:
-        client = distributed.Client(address, timeout=ANSWER_S)
+        with time_limit(3.0 * ANSWER_S):  # what is no scheduler may keep Dask for ever
+            client = distributed.Client(address, timeout=ANSWER_S)
+    except TooLong:
+        raise CorampError(
+            f"--cluster: {address}: no Dask scheduler answers within {3 * ANSWER_S} s; "
+            "allowed is an address like tcp://host:8786"
+        ) from None
     except (OSError, ValueError, ImportError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise CorampError(
