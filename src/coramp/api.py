@@ -145,12 +145,14 @@ def run(
     out: str | Path | None = None,
     keep_sumo: bool = False,
     gui: bool = False,
+    keep_messages: bool = False,
     notice: Callable[[str], None] | None = None,
 ) -> RunResult:
     """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
-    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit.
+    run (default: fair). ``keep_messages`` keeps what the coordinator was told and commanded, for
+    ``coramp audit``. ``notice`` is told beforehand where demand is above the lane's limit.
     Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
@@ -174,9 +176,10 @@ def run(
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if out is None:
-        return _executed(spec, SumoOptions(gui=gui))
+        return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages))
     with staged_folder(Path(out), MARK) as stage:
-        result = _executed(spec, SumoOptions(stage / "sumo" if keep_sumo else None, gui))
+        keep_in = stage / "sumo" if keep_sumo else None
+        result = _executed(spec, SumoOptions(keep_in, gui, keep_messages))
         write_run(stage, result)
     return result
 

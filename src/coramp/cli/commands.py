@@ -138,6 +138,9 @@ def run(
     horizon: Annotated[float | None, typer.Option(help="Seconds of arrivals.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the records.")] = None,
     keep_sumo: Annotated[bool, typer.Option(help="Keep SUMO's own files in OUT/sumo.")] = False,
+    keep_messages: Annotated[
+        bool, typer.Option(help="Keep what was told and commanded, for coramp audit.")
+    ] = False,
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
     json: Json = False,
 ) -> None:
@@ -146,6 +149,8 @@ def run(
     from coramp.cli.console import print_json, print_run, tell_of_compiling, tell_of_demand, working
     from coramp.scenarios.toml_files import parse_overrides
 
+    if keep_messages and out is None:
+        raise CorampError("--keep-messages: there is no folder to keep them in; give --out DIR")
     tell_of_compiling()
     with working("running"):
         result = run_scenario(
@@ -160,6 +165,7 @@ def run(
             horizon_s=horizon,
             out=out,
             keep_sumo=keep_sumo,
+            keep_messages=keep_messages,
             gui=gui,
             notice=tell_of_demand,
         )

@@ -6,6 +6,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord, Refusal
+from coramp.messages.log import Told
 
 LANES = ("ramp", "acceleration", "mainline")
 """Names of the lane codes of ``coordination.driven``."""
@@ -53,7 +54,7 @@ class Outcome:
     ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
     simulator made of it; for its own drivers both are its steps. ``end_s`` is when the run ended or
     was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
-    places in ``passages``.
+    places in ``passages``. ``told`` are the messages, where they were to be kept.
     """
 
     cooperative: bool
@@ -67,6 +68,7 @@ class Outcome:
     refusals: tuple[Refusal, ...] = ()
     interventions: int = 0
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    told: Told | None = None
 
     @property
     def until_s(self) -> FloatArray:

@@ -5,7 +5,7 @@ import shutil
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,9 @@ from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
+from coramp.messages.channel import Channel
+from coramp.messages.feed import RequestFeed
+from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.outcome import Outcome, Pieces
 from coramp.scenarios.model import Drivers, Scenario
@@ -38,7 +41,9 @@ from coramp.worlds.sumo.network import (
     road_plan,
 )
 from coramp.worlds.sumo.session import Session
+from coramp.worlds.sumo.telling import positions_in_sumo
 from coramp.worlds.sumo.traits import traits_of
+from coramp.worlds.telling import reports_of_samples, together
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
@@ -63,10 +68,11 @@ class Samples:
 
 @dataclass(frozen=True)
 class SumoOptions:
-    """How a run is watched: files kept in a folder, a window."""
+    """How a run is watched: files kept in a folder, a window, messages kept in the outcome."""
 
     keep_in: Path | None = None
     gui: bool = False
+    keep_messages: bool = False
 
 
 def run_cooperative(
@@ -80,14 +86,20 @@ def run_cooperative(
     arrivals = arrivals_of(scenario, seed)
     plan = road_plan(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
-        files = _Files(Path(name), scenario, plan, seed, options, ballistic=True)
+        keep = options.keep_messages
+        files = _Files(Path(name), scenario, plan, seed, options, ballistic=True, sampled=keep)
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
         with Session(
             [*files.options(), "--insertion-checks", "none"], rules.control.step_s, options.gui
         ) as session:
             plant = CooperativePlant(session, plan.lane_starts_m(), rules)
+            channel = Channel(plant)
             coordinator = Coordinator(
-                strategy, rules, arrivals, scenario.fastest_mainline_entry_mps, plant
+                strategy,
+                rules,
+                RequestFeed(arrivals),
+                scenario.fastest_mainline_entry_mps,
+                channel if keep else plant,
             )
             cap_step = cap_step_of(scenario)
             coordinator.expect_arrivals()
@@ -100,7 +112,8 @@ def run_cooperative(
             files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=True))
         files.keep()
         collisions = files.collisions()
-    return cooperative_outcome(
+        samples = files.samples(arrivals) if keep else None
+    outcome = cooperative_outcome(
         coordinator,
         arrivals,
         rules.control.step_s,
@@ -109,6 +122,19 @@ def run_cooperative(
         _driven(plant, coordinator.entered()[0], len(arrivals)),
         collisions,
     )
+    if samples is None:
+        return outcome
+    positions = together(
+        (
+            reports_of_samples(*_motion_of(samples), rules.control.step_s),
+            positions_in_sumo(plant, outcome.vehicle_of_row, rules.control.step_s),
+        )
+    )
+    return replace(outcome, told=Told(arrivals, channel.commands, positions, (), end_step))
+
+
+def _motion_of(samples: Samples) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    return samples.vehicle, samples.time_s, samples.station_m, samples.speed_mps
 
 
 def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) -> Pieces:
@@ -165,7 +191,19 @@ def run_uncontrolled(
         driven=Pieces(first, rows),
         end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
         collisions=collisions,
+        told=_told_of_drivers(arrivals, samples, meter, step_s) if options.keep_messages else None,
     )
+
+
+def _told_of_drivers(
+    arrivals: Sequence[Arrival], samples: Samples, meter: Meter | None, step_s: float
+) -> Told:
+    """Returns the messages of a run of drivers, who are reported and never commanded."""
+    positions = reports_of_samples(*_motion_of(samples), step_s)
+    last = round(samples.time_s.max(initial=0.0) / step_s)
+    signals, readings = ([], []) if meter is None else (meter.signals, meter.readings)
+    last = max(last, *(round(reading.time_s / step_s) for reading in readings), 0)
+    return Told(arrivals, signals, positions, readings, last)
 
 
 def _passing_times(

@@ -5,6 +5,8 @@ import math
 import numpy as np
 
 from coramp.coordination.ledger import Ledger
+from coramp.messages.commands import SetSignal
+from coramp.messages.events import DetectorReading
 from coramp.road.rules import packed
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider, Detectors, Memory, Reports, SetRampSignal, View
@@ -45,7 +47,10 @@ def queue_loop_m(scenario: Scenario) -> float:
 
 
 class Meter:
-    """Asks a strategy once a period, with what the loops tell, and sets the signal."""
+    """Asks a strategy once a period, with what the loops tell, and sets the signal.
+
+    ``readings`` and ``signals`` are what it was told and what it commanded.
+    """
 
     def __init__(self, session: Session, scenario: Scenario, strategy: Decider) -> None:
         self._session = session
@@ -58,6 +63,8 @@ class Meter:
         self._nobody = Ledger(rules.road.mainline_speed_mps, rules.road.mainline_end_m).fleet
         self._red_s = math.inf
         self._on_ramp: set[str] = set()
+        self.readings: list[DetectorReading] = []
+        self.signals: list[SetSignal] = []
         session.set_signal(SIGNAL, RAMP_LANE, GREEN)
 
     def run(self, first_step: int, last_step: int) -> None:
@@ -76,6 +83,7 @@ class Meter:
         self._memory = decision.memory
         for command in decision.commands:
             if isinstance(command, SetRampSignal):
+                self.signals.append(SetSignal(round(time_s / self._step_s), command.green))
                 self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if command.green else YELLOW)
                 self._red_s = math.inf if command.green else time_s + YELLOW_S
         if time_s >= self._red_s:
@@ -86,6 +94,7 @@ class Meter:
         waiting = self._session.vehicles_on(RAMP_LANE)
         passed, self._on_ramp = len(self._on_ramp - waiting), waiting
         seen = Detectors(mainline_occupancy, queue_occupancy, passed)
+        self.readings.append(DetectorReading(time_s, mainline_occupancy, queue_occupancy, passed))
         return View(
             time_s,
             (),
