@@ -162,7 +162,10 @@ def test_how_much_room_the_book_has_changes_nothing(situation, seed):
     histories = []
     for room in (1, 5000):
         coordinator = Coordinator(
-            Wild(Random(seed)), scenario.rules(), RequestFeed(arrivals), scenario.fastest_mainline_entry_mps
+            Wild(Random(seed)),
+            scenario.rules(),
+            RequestFeed(arrivals),
+            scenario.fastest_mainline_entry_mps,
         )
         coordinator.ledger.make_room(room)
         coordinator.expect_arrivals()

@@ -48,9 +48,7 @@ def at_once(name, requests):
 
 
 def service(name="mainline-priority"):
-    return Service(
-        strategy_named(name)(), SCENARIO.rules(), SCENARIO.fastest_mainline_entry_mps
-    )
+    return Service(strategy_named(name)(), SCENARIO.rules(), SCENARIO.fastest_mainline_entry_mps)
 
 
 def step_by_step(name, requests):

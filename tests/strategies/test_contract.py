@@ -21,7 +21,10 @@ def test_total_deterministic_finite_and_pure(name, situation):
     scenario, arrivals, _ = situation
     watched = Twice(strategy_named(name))
     coordinator = Coordinator(
-        Guarded(watched), scenario.rules(), RequestFeed(arrivals), scenario.fastest_mainline_entry_mps
+        Guarded(watched),
+        scenario.rules(),
+        RequestFeed(arrivals),
+        scenario.fastest_mainline_entry_mps,
     )
     coordinator.expect_arrivals()
     coordinator.run(2000)

@@ -247,6 +247,30 @@ def study(
         raise typer.Exit(WRONG)
 
 
+@app.command(epilog="Example: coramp audit out/r")
+def audit(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out --keep-messages.")
+    ],
+    json: Json = False,
+) -> None:
+    """Check a run by its messages: every decision, command, report and safety figure."""
+    from coramp.audit.audit import as_data
+    from coramp.audit.audit import audit as audited
+    from coramp.cli.console import print_audit, print_json, tell_of_compiling
+
+    tell_of_compiling()
+    result = audited(folder)
+    if json:
+        print_json(as_data(result))
+    else:
+        print_audit(result)
+    for found in result.contradictions:
+        print(f"Contradiction: {found.line}", file=sys.stderr)
+    if not result.holds:
+        raise typer.Exit(UNSAFE)
+
+
 @app.command(epilog="Example: coramp explain out/r r00012")
 def explain(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],

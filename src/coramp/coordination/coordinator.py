@@ -245,7 +245,7 @@ class Coordinator:
         heapq.heappush(self._wakes, (step, row, kind))
 
     def place(self, number: int, station_m: float, step: int) -> bool:
-        """Puts who asks to enter on the road, harmonised from there; False where that is not safe."""
+        """Puts who asks to enter on the road, from that station; False where that is not safe."""
         self.ledger.make_room()
         code = enter(
             self.ledger.book,

@@ -1,4 +1,4 @@
-"""What a world tells the coordinator. Steps count the control clock; step k is at ``k * step_s``."""
+"""What a world tells the coordinator. Step k of the control clock is at ``k * step_s``."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

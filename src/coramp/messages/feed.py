@@ -11,7 +11,7 @@ from coramp.messages.events import RequestToEnter
 
 
 class Requests(NamedTuple):
-    """Requests as kernels read them, one entry each; those from ``offered`` on are not there yet."""
+    """Requests as kernels read them; there may be more entries than the feed has requests."""
 
     step: IntArray
     on_ramp: BoolArray

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.messages.commands import Command, Enter, Follow, SetSignal
+from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
 
 LOG_VERSION = 1
@@ -74,7 +74,10 @@ class Positions(NamedTuple):
 NO_POSITIONS = Positions(
     np.empty(0, np.int64),
     np.empty(0, np.int64),
-    *(np.empty(0) for _ in range(4)),
+    np.empty(0),
+    np.empty(0),
+    np.empty(0),
+    np.empty(0),
     np.empty(0, np.bool_),
 )
 
@@ -95,18 +98,24 @@ def report_steps(step_s: float) -> int:
 
 
 def as_frame(told: Told, step_s: float) -> pl.DataFrame:
-    """Returns the log: by time; at one time reports, then readings, requests and commands."""
+    """Returns the log, by time.
+
+    At one time come reports of once a second, readings, requests, commands, and then what vehicles
+    tell as they obey.
+    """
+    obeying = told.positions.comparison | ~np.isnan(told.positions.accel_mps2)
     parts = [
-        _positions(told, step_s),
+        _positions(told, ~obeying, step_s),
         _rows([_reading(reading) for reading in told.readings]),
         _rows([_request(r, step_s) for r in told.requests if r.step <= told.end_step]),
         _rows([row for command in told.commands for row in _command(command, step_s)]),
+        _positions(told, obeying, step_s),
         _rows([{"kind": END, "time_s": told.end_step * step_s}]),
     ]
     return (
         pl.concat(part.with_columns(order=pl.lit(k)) for k, part in enumerate(parts))
         .sort("time_s", "order", maintain_order=True)
-        .select(MESSAGES)
+        .select(list(MESSAGES))
     )
 
 
@@ -115,11 +124,11 @@ def _rows(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
     return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64))
 
 
-def _positions(told: Told, step_s: float) -> pl.DataFrame:
-    within = told.positions.step <= told.end_step
-    seen = Positions(*(column[within] for column in told.positions))
+def _positions(told: Told, chosen: BoolArray, step_s: float) -> pl.DataFrame:
+    within = chosen & (told.positions.step <= told.end_step)
+    seen = Positions._make(column[within] for column in told.positions)
     names = np.array([request.vehicle_id for request in told.requests], object)
-    columns = {
+    columns: dict[str, Any] = {
         "time_s": seen.step * step_s,
         "kind": np.where(seen.comparison, COMPARISON, REPORT).astype(object),
         "vehicle_id": names[seen.vehicle] if len(seen.vehicle) else [],
@@ -134,7 +143,7 @@ def _positions(told: Told, step_s: float) -> pl.DataFrame:
         pl.col("accel_mps2").fill_nan(None),
         *(pl.lit(None, MESSAGES[name]).alias(name) for name in MESSAGES if name not in schema),
     )
-    return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64)).select(MESSAGES)
+    return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64)).select(list(MESSAGES))
 
 
 def _reading(reading: DetectorReading) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.messages.log import Positions, report_steps
+from coramp.messages.log import NO_POSITIONS, Positions, report_steps
 from coramp.records.outcome import Outcome
 
 
@@ -28,12 +28,18 @@ def reports_of_pieces(outcome: Outcome, step_s: float, end_step: int) -> Positio
         station_m = piece[:, 1] + 0.5 * (piece[:, 2] + then_mps) * after_s
         found.append((np.full(len(steps), vehicle), steps, station_m, then_mps))
     if not found:
-        return _positions(*(np.empty(0) for _ in range(4)), step_s=step_s)
-    return _positions(*(np.concatenate(column) for column in zip(*found, strict=True)), step_s)
+        return NO_POSITIONS
+    vehicles, told_steps, stations_m, speeds_mps = (
+        np.concatenate(column) for column in zip(*found, strict=True)
+    )
+    return _positions(vehicles, told_steps, stations_m, speeds_mps, step_s)
 
 
 def reports_of_samples(
-    vehicle: IntArray, time_s: FloatArray, station_m: FloatArray, speed_mps: FloatArray,
+    vehicle: IntArray,
+    time_s: FloatArray,
+    station_m: FloatArray,
+    speed_mps: FloatArray,
     step_s: float,
 ) -> Positions:
     """Returns the reports among samples, which are by vehicle and time; the first is the entry."""
@@ -50,7 +56,7 @@ def _positions(
     return Positions(
         vehicle.astype(np.int64),
         steps,
-        steps * step_s,
+        np.asarray(steps * step_s, np.float64),
         station_m,
         speed_mps,
         np.full(len(steps), np.nan),
@@ -60,4 +66,4 @@ def _positions(
 
 def together(parts: Sequence[Positions]) -> Positions:
     """Returns several tables of positions as one."""
-    return Positions(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return Positions._make(np.concatenate(column) for column in zip(*parts, strict=True))

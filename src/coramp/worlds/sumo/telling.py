@@ -26,7 +26,9 @@ def positions_in_sumo(
                 vehicle_of_row[rows[:, 0].astype(np.int64)],
                 steps,
                 of_s,
-                *rows[:, 2:5].T,
+                rows[:, 2],
+                rows[:, 3],
+                rows[:, 4],
                 np.zeros(len(rows), np.bool_),
             )
         )
@@ -37,8 +39,9 @@ def positions_in_sumo(
             Positions(
                 vehicle_of_row[rows[:, 0].astype(np.int64)],
                 steps,
-                steps * step_s,
-                *rows[:, 2:4].T,
+                np.asarray(steps * step_s, np.float64),
+                rows[:, 2],
+                rows[:, 3],
                 np.full(len(rows), np.nan),
                 np.ones(len(rows), np.bool_),
             )
