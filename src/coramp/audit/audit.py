@@ -25,11 +25,13 @@ from coramp.audit.driving import (
 from coramp.audit.figures import Derived, derive
 from coramp.audit.inputs import Inputs, read_inputs
 from coramp.audit.kinematics import ROUNDING
-from coramp.audit.orders import Motion, Passages, passages_of
+from coramp.audit.orders import Motion, Passages, exits_s, passages_of
 from coramp.audit.positions import off_the_order
 from coramp.audit.verdicts import Audit, Check, Finding, finding, judged, unchecked
 from coramp.coordination.examination import bounds_of
+from coramp.errors import CorampError
 from coramp.messages.log import COMPARISON, REPORT
+from coramp.messages.reading import OutOfOrderError
 from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 
@@ -54,9 +56,35 @@ TOO_SELDOM = "drivers report once a second, and are under no commitment"
 def audit(folder: Path) -> Audit:
     """Returns what the log of a run confirms and what it contradicts.
 
-    Raises CorampError for a folder or a log that cannot be read.
+    Raises CorampError for a folder or a log that cannot be read. Where one message alone is out of
+    place it is put there: if the log then contradicts, the message was given another time, and that
+    is told; if not, the log is refused for its order.
     """
-    inputs = read_inputs(folder)
+    try:
+        return _audited(read_inputs(folder))
+    except OutOfOrderError as error:
+        if not error.alone:
+            raise
+        return _with_one_moved(folder, error)
+
+
+def _with_one_moved(folder: Path, error: OutOfOrderError) -> Audit:
+    try:
+        inputs = read_inputs(folder, put_in_order=True)
+    except CorampError:
+        raise error from None
+    result = _audited(inputs)
+    if result.holds:
+        raise error
+    row = int(np.flatnonzero(inputs.log.places == error.row)[0])
+    text = "its time is not that of the messages around it"
+    moved = finding(inputs.log, row, "the order of messages", text)
+    order = judged("messages are in order", f"{inputs.log.frame.height} rows", [moved])
+    return Audit(folder, (order, *result.checks))
+
+
+def _audited(inputs: Inputs) -> Audit:
+    folder = inputs.folder
     requests = check_requests(inputs)
     if len(inputs.log.strangers):
         return Audit(folder, (requests, _strangers(inputs), unchecked("all else", "see above")))
@@ -71,11 +99,27 @@ def audit(folder: Path) -> Audit:
         check_kinematics(inputs),
         check_reports(inputs, motion),
         check_completeness(inputs, motion),
+        _end(inputs, motion),
         *_figures(inputs, motion),
         check_trajectories(inputs, motion),
         *check_records(inputs, again),
     ]
     return Audit(folder, tuple(checks))
+
+
+def _end(inputs: Inputs, motion: Motion) -> Check:
+    """Holds the end of the run to the exits: two steps after the last, or when it is cut off."""
+    simulation, log = inputs.scenario.simulation, inputs.log
+    due = round((simulation.horizon_s + simulation.drain_s) / inputs.step_s)
+    left_s = exits_s(motion.first, motion.rows, inputs.scenario.mainline.end_m)
+    last_s = float(np.max(left_s, initial=0.0))
+    if math.isfinite(last_s):
+        due = min(due, math.ceil(last_s / inputs.step_s) + 2)
+    findings = []
+    if due != log.end_step:
+        text = f"the run ends at {due * inputs.step_s:.3f} s by the exits of its vehicles"
+        findings = [finding(log, log.frame.height - 1, "a commitment", text)]
+    return judged("the end of the run", f"{log.end_step * inputs.step_s:.3f} s", findings)
 
 
 def _strangers(inputs: Inputs) -> Check:

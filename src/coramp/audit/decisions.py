@@ -83,7 +83,8 @@ def _changed(inputs: Inputs, due: Orders, until: int) -> list[Finding]:
         theirs = due.pieces[due.first[k] : due.first[k + 1]]
         text = _difference(mine, theirs)
         if not text and told.merge_s[k] != due.merge_s[k]:
-            text = f"merges at {told.merge_s[k]!r} s, decided is {due.merge_s[k]!r} s"
+            was, now = float(due.merge_s[k]), float(told.merge_s[k])
+            text = f"merges at {now!r} s, decided is {was!r} s"
         if text:
             found.append(finding(inputs.log, int(inputs.order_rows[k]), DECISION, text))
     return found

@@ -46,15 +46,17 @@ class Inputs:
         return bool(self.run.content["engine"] == "exact")
 
 
-def read_inputs(folder: Path) -> Inputs:
+def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     """Returns what there is to audit; raises CorampError for what cannot be read.
 
-    Orders are empty where the log has messages of vehicles that never asked to enter.
+    ``put_in_order`` puts messages that are out of place where they belong. Orders are empty where
+    the log has messages of vehicles that never asked to enter.
     """
     run = read_run(folder)
     scenario = _scenario_of(folder, run)
     known = set(run.vehicles["vehicle_id"].to_list())
-    log = read_log(folder / f"{MESSAGES}.parquet", scenario.control.step_s, known)
+    path = folder / f"{MESSAGES}.parquet"
+    log = read_log(path, scenario.control.step_s, known, put_in_order)
     askers = _askers(log)
     rows = log.of_kind(ENTRY, COMMAND)[: 0 if len(log.strangers) else None]
     return Inputs(folder, run, scenario, log, askers, _orders(log, askers, rows), rows)

@@ -62,7 +62,9 @@ class Audit:
 def finding(log: MessageLog, row: int, against: str, text: str) -> Finding:
     """Returns a contradiction of a row of the log."""
     said = log.frame.row(row, named=True)
-    return Finding(against, text, row, said["time_s"], said["vehicle_id"], said["kind"])
+    return Finding(
+        against, text, int(log.places[row]), said["time_s"], said["vehicle_id"], said["kind"]
+    )
 
 
 def judged(claim: str, how: str, findings: list[Finding]) -> Check:

@@ -101,7 +101,7 @@ def as_frame(told: Told, step_s: float) -> pl.DataFrame:
     """Returns the log, by time.
 
     At one time come reports of once a second, readings, requests, commands, and then what vehicles
-    tell as they obey.
+    tell as they obey; positions by vehicle.
     """
     obeying = told.positions.comparison | ~np.isnan(told.positions.accel_mps2)
     parts = [
@@ -114,7 +114,8 @@ def as_frame(told: Told, step_s: float) -> pl.DataFrame:
     ]
     return (
         pl.concat(part.with_columns(order=pl.lit(k)) for k, part in enumerate(parts))
-        .sort("time_s", "order", maintain_order=True)
+        .with_columns(who=pl.when(pl.col("kind").is_in([REPORT, COMPARISON])).then("vehicle_id"))
+        .sort("time_s", "order", "who", maintain_order=True)
         .select(list(MESSAGES))
     )
 

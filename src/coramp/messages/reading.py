@@ -40,17 +40,34 @@ NEEDED = {
 }
 
 
+PLACES = {
+    REPORT: 0,
+    READING: 1,
+    REQUEST: 2,
+    ENTRY: 3,
+    COMMAND: 3,
+    ACKNOWLEDGEMENT: 3,
+    SIGNAL: 3,
+    COMPARISON: 4,
+    END: 5,
+}
+"""In which order messages of one time are told; reports with an acceleration come later."""
+OBEYING = PLACES[COMPARISON]
+
+
 @dataclass(frozen=True)
 class MessageLog:
     """A log that could be read: one entry a message in each array, numbers nan where there is none.
 
     ``vehicle`` is the number of its vehicle's request, -1 where there is none; ``strangers`` are
     rows about vehicles of the run that never asked to enter. ``requests`` are the rows of the
-    requests, by number. Commands' pieces are ``pieces[first[row] : first[row + 1]]``.
+    requests, by number. ``places`` are the messages' rows in the file. Commands' pieces are
+    ``pieces[first[row] : first[row + 1]]``.
     """
 
     path: Path
     frame: pl.DataFrame
+    places: IntArray
     kind: IntArray
     step: IntArray
     vehicle: IntArray
@@ -68,12 +85,6 @@ class MessageLog:
         """Returns a column of numbers, nan where there is none."""
         return self.frame[column].fill_null(np.nan).to_numpy()
 
-    def name(self, row: int) -> str:
-        """Returns what a message is called in words: row, time, vehicle and kind."""
-        said = self.frame.row(row, named=True)
-        about = f", {said['vehicle_id']}" if said["vehicle_id"] is not None else ""
-        return f"row {row} ({said['time_s']:.3f} s{about}, {said['kind']})"
-
     def vehicle_id(self, number: int) -> str:
         """Returns the name of a vehicle."""
         return str(self.frame["vehicle_id"][int(self.requests[number])])
@@ -84,22 +95,43 @@ class MessageLog:
         return int(self.step[-1])
 
 
-def read_log(path: Path, step_s: float, of_run: Collection[str]) -> MessageLog:
+class OutOfOrderError(CorampError):
+    """Messages are not in their order; ``row`` is the first that is out of place.
+
+    ``alone`` tells that all the others are in order.
+    """
+
+    def __init__(self, message: str, row: int, alone: bool) -> None:
+        super().__init__(message)
+        self.row, self.alone = row, alone
+
+
+def read_log(
+    path: Path, step_s: float, of_run: Collection[str], put_in_order: bool = False
+) -> MessageLog:
     """Returns a log; raises CorampError for one that is not whole, in order, known and finite.
 
-    ``of_run`` are the vehicles of the run: a message about any other is refused.
+    ``of_run`` are the vehicles of the run: a message about any other is refused. ``put_in_order``
+    puts messages into their order where they are not in it.
     """
     frame = _read(path)
     _check_values(path, frame)
-    kind = frame["kind"].replace_strict(dict(zip(KINDS, range(len(KINDS)), strict=True)))
     step = _checked_steps(path, frame, step_s)
+    keys = _order_of(frame)
+    places = np.arange(frame.height)
+    if put_in_order:
+        places = np.argsort(keys, kind="stable")
+        frame, keys, step = frame[places], keys[places], step[places]
+    _check_order(path, frame, keys)
+    _check_end(path, frame)
+    kind = frame["kind"].replace_strict(dict(zip(KINDS, range(len(KINDS)), strict=True)))
     vehicle, requests, strangers = _vehicles(path, frame, of_run)
     counts = frame[PIECES[0]].list.len().fill_null(0).to_numpy()
     commands = frame.filter(pl.col("kind").is_in([ENTRY, COMMAND]))
     pieces = np.column_stack([commands[name].explode().to_numpy() for name in PIECES])
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     return MessageLog(
-        path, frame, kind.to_numpy(), step, vehicle, requests, strangers, first, pieces
+        path, frame, places, kind.to_numpy(), step, vehicle, requests, strangers, first, pieces
     )
 
 
@@ -120,6 +152,10 @@ def _read(path: Path) -> pl.DataFrame:
         raise CorampError(
             f"{path}: columns are not those of version {LOG_VERSION} "
             f"({', '.join(wrong) or 'order'}); allowed are {', '.join(MESSAGES)}"
+        )
+    if frame.is_empty():
+        raise CorampError(
+            f"{path}: is empty; allowed is a log that ends with a message of kind {END}"
         )
     return frame
 
@@ -166,15 +202,53 @@ def _check_values(path: Path, frame: pl.DataFrame) -> None:
     _refuse(path, frame, ~streams, "there is no stream {stream!r}; allowed are mainline and ramp")
 
 
+def _order_of(frame: pl.DataFrame) -> IntArray:
+    """Returns what messages are ordered by: time, then kind, then for positions the vehicle."""
+    obeying = (frame["kind"] == COMPARISON) | frame["accel_mps2"].is_not_null()
+    place = frame["kind"].replace_strict(PLACES, return_dtype=pl.Int64).to_numpy()
+    place = np.where(obeying.to_numpy(), OBEYING, place)
+    _, time = np.unique(frame["time_s"].to_numpy(), return_inverse=True)
+    names, name = np.unique(frame["vehicle_id"].fill_null("").to_numpy(), return_inverse=True)
+    by_name = np.isin(frame["kind"].to_numpy(), (REPORT, COMPARISON))
+    within = (time * len(PLACES) + place) * len(names)
+    return np.asarray(within + np.where(by_name, name, 0), np.int64)
+
+
+def _check_order(path: Path, frame: pl.DataFrame, keys: IntArray) -> None:
+    """Raises OutOfOrderError where messages are not in order."""
+    back = np.flatnonzero(keys[1:] < keys[:-1])
+    if len(back) == 0:
+        return
+    row = int(back[0])
+    told = "comes before earlier messages"
+    rest = np.delete(keys[max(0, row - 1) : row + 3], min(row, 1))
+    if (rest[1:] < rest[:-1]).any():  # not the former of the two is out of place, but the latter
+        row, told = row + 1, "comes after a later message"
+    others = np.delete(keys, row)
+    alone = bool((others[1:] >= others[:-1]).all())
+    said = frame.row(row, named=True)
+    about = f", {said['vehicle_id']}" if said["vehicle_id"] is not None else ""
+    raise OutOfOrderError(
+        f"{path}: row {row} ({said['time_s']} s{about}, {said['kind']}): {told}; allowed are "
+        "messages by time, then kind and vehicle, as they were told",
+        row,
+        alone,
+    )
+
+
 def _checked_steps(path: Path, frame: pl.DataFrame, step_s: float) -> IntArray:
-    """Returns the steps of all messages; refuses what is not in order, not whole, or too early."""
+    """Returns the steps of all messages; refuses what is off the clock, or before its time."""
     time_s = frame["time_s"].to_numpy()
     step = np.rint(time_s / step_s).astype(np.int64)
     off = (step * step_s != time_s) | (time_s < 0.0)
     _refuse(path, frame, off, f"is no step of the control clock; allowed are multiples of {step_s}")
-    back = np.append(False, step[1:] < step[:-1])[: len(step)]
-    told = "comes after a later message; allowed are messages in order of time"
-    _refuse(path, frame, back, told)
+    early = (frame["of_s"] > frame["time_s"]).fill_null(value=False).to_numpy()
+    _refuse(path, frame, early, "tells of {of_s} s, before its time; allowed is up to {time_s} s")
+    return step
+
+
+def _check_end(path: Path, frame: pl.DataFrame) -> None:
+    """Refuses a log that is cut, or goes on after its end."""
     ends = (frame["kind"] == END).to_numpy()
     if not ends.any() or not ends[-1]:
         raise CorampError(
@@ -182,9 +256,6 @@ def _checked_steps(path: Path, frame: pl.DataFrame, step_s: float) -> IntArray:
             f"a message of kind {END}"
         )
     _refuse(path, frame, ends[:-1], "comes before other messages; allowed is one, as the last")
-    early = (frame["of_s"] > frame["time_s"]).fill_null(value=False).to_numpy()
-    _refuse(path, frame, early, "tells of {of_s} s, before its time; allowed is up to {time_s} s")
-    return step
 
 
 def _vehicles(
@@ -206,6 +277,8 @@ def _vehicles(
     rows = np.arange(frame.height)
     early = about & (vehicle >= 0)
     early[early] = rows[early] < requests[vehicle[early]]
-    told = "comes before its vehicle has asked to enter; allowed is after that"
-    _refuse(path, frame, early, told)
+    if early.any():
+        asks = requests[vehicle[np.argmax(early)]]
+        told = f"comes before its vehicle asks to enter, in row {asks}; allowed is after that"
+        _refuse(path, frame, early, told)
     return vehicle, requests, np.flatnonzero(about & (vehicle < 0))
