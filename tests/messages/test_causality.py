@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp.audit.replay import replayed
-from coramp.messages.reading import read_log
+from coramp.messages.reading import PLACES, read_log
 from coramp.strategies.registry import strategies, strategy_named
 from tests.messages.test_service import listed
 
@@ -46,15 +46,14 @@ def altered(frame, row, how):
             return frame.filter(pl.col("vehicle_id").ne_missing(vehicle))
         return frame.filter(~here)
     if how == "later":
-        last_s = frame["time_s"][row] + STEP_S * 5
-        step = round(last_s / STEP_S)
+        step = round(frame["time_s"][row] / STEP_S) + 5
         vehicle = frame["vehicle_id"][row]
-        moved = frame.filter(
-            (pl.col("vehicle_id").ne_missing(vehicle)) | (pl.col("kind") == "request")
-        )
-        here = (pl.col("vehicle_id") == vehicle) & (pl.col("kind") == "request")
+        asks = pl.col("kind") == "request"
+        moved = frame.filter((pl.col("vehicle_id").ne_missing(vehicle)) | asks)
+        here = (pl.col("vehicle_id") == vehicle) & asks
         moved = moved.with_columns(time_s=pl.when(here).then(step * STEP_S).otherwise("time_s"))
-        return moved.sort("time_s", maintain_order=True)
+        rank = pl.col("kind").replace_strict(PLACES, return_dtype=pl.Int64)
+        return moved.sort("time_s", rank, maintain_order=True)
     return frame.with_columns(pl.when(here).then(pl.col(how) * 1.05).otherwise(how).alias(how))
 
 

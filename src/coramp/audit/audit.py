@@ -99,7 +99,7 @@ def _audited(inputs: Inputs) -> Audit:
         check_kinematics(inputs),
         check_reports(inputs, motion),
         check_completeness(inputs, motion),
-        _end(inputs, motion),
+        _end(inputs, exits_s(motion.first, motion.rows, inputs.scenario.mainline.end_m)),
         *_figures(inputs, motion),
         check_trajectories(inputs, motion),
         *check_records(inputs, again),
@@ -107,11 +107,10 @@ def _audited(inputs: Inputs) -> Audit:
     return Audit(folder, tuple(checks))
 
 
-def _end(inputs: Inputs, motion: Motion) -> Check:
+def _end(inputs: Inputs, left_s: FloatArray) -> Check:
     """Holds the end of the run to the exits: two steps after the last, or when it is cut off."""
     simulation, log = inputs.scenario.simulation, inputs.log
     due = round((simulation.horizon_s + simulation.drain_s) / inputs.step_s)
-    left_s = exits_s(motion.first, motion.rows, inputs.scenario.mainline.end_m)
     last_s = float(np.max(left_s, initial=0.0))
     if math.isfinite(last_s):
         due = min(due, math.ceil(last_s / inputs.step_s) + 2)
@@ -132,10 +131,11 @@ def _strangers(inputs: Inputs) -> Check:
 def _of_drivers(inputs: Inputs) -> list[Check]:
     """What can be confirmed of SUMO's own drivers, and what cannot."""
     commanded = inputs.order_rows
-    checks = [check_positions(inputs)]
+    checks = check_positions(inputs)
     text = "commands a driver, who takes no commands"
     findings = [finding(inputs.log, int(row), "a decision", text) for row in commanded]
     checks.append(judged("nobody was commanded", "no trajectory in the log", findings))
+    checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))
     if is_metered(strategy_named(inputs.run.content["strategy"])):
         checks.insert(0, check_signals(inputs))
     return [*checks, *(unchecked(name, TOO_SELDOM) for name in FIGURES)]
@@ -187,7 +187,8 @@ def _figure(inputs: Inputs, name: str, found: float | None) -> Check:
     findings = []
     if not _alike(told, found):
         findings = [Finding("run.json", f"{name}: {told!r} is told, {found!r} was derived")]
-    return judged(name, "null" if told is None else f"{told:.6g}", findings)
+    how = f"{told:.6g}" if isinstance(told, int | float) else repr(told)
+    return judged(name, how, findings)
 
 
 def _alike(told: object, found: float | None) -> bool:

@@ -11,8 +11,9 @@ from coramp.audit.verdicts import Check, Finding, finding, judged
 from coramp.coordination.guard import strategy_to_run
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
-from coramp.messages.log import ACKNOWLEDGEMENT, SIGNAL
+from coramp.messages.log import ACKNOWLEDGEMENT, READING, SIGNAL
 from coramp.metrics.tables import decisions_table
+from coramp.strategies.base import period_of, steps_of_period
 from coramp.strategies.situation import RUNGS
 
 DECISION = "a decision"
@@ -42,6 +43,12 @@ def check_requests(inputs: Inputs) -> Check:
         for name, request in expected.items()
         if name not in asked and request.step <= inputs.log.end_step
     ]
+    order = [request.vehicle_id for request in drawn if request.vehicle_id in asked]
+    for number, (request, due_id) in enumerate(zip(told, order, strict=False)):
+        if not findings and request.vehicle_id != due_id:
+            row = int(inputs.log.requests[number])
+            text = f"comes before that of {due_id}, who is to come first"
+            findings.append(finding(inputs.log, row, "the scenario's demand", text))
     how = f"{len(told)} requests are those that the scenario draws with its seed"
     return judged("who asked to enter, and when", how, findings)
 
@@ -112,13 +119,12 @@ def _instead(inputs: Inputs, due: Orders, place: int) -> str:
 def check_signals(inputs: Inputs) -> Check:
     """Feeds the readings to a fresh strategy and compares every colour commanded."""
     name, log = inputs.run.content["strategy"], inputs.log
-    due = replayed_signals(
-        log, inputs.scenario, strategy_to_run(name, inputs.scenario.strategy.get(name))
-    )
+    strategy = strategy_to_run(name, inputs.scenario.strategy.get(name))
+    due = replayed_signals(log, inputs.scenario, strategy)
+    findings = _readings(inputs, steps_of_period(period_of(strategy) or 1.0, inputs.step_s))
     rows = log.of_kind(SIGNAL)
     told = list(zip(log.step[rows].tolist(), log.frame["green"].gather(rows), strict=True))
     wanted = [(signal.step, signal.green) for signal in due]
-    findings = []
     for k in range(max(len(told), len(wanted))):
         if told[k : k + 1] != wanted[k : k + 1]:
             row = int(rows[k]) if k < len(rows) else log.frame.height - 1
@@ -127,9 +133,24 @@ def check_signals(inputs: Inputs) -> Check:
                 colour = "green" if wanted[k][1] else "red"
                 instead = f"{colour} at {wanted[k][0] * inputs.step_s:.3f} s"
             text = f"a strategy that is told the same commands {instead} instead"
-            findings = [finding(log, row, DECISION, text)]
+            findings.append(finding(log, row, DECISION, text))
             break
     return judged("decisions", f"{len(due)} signals of a fresh strategy", findings)
+
+
+def _readings(inputs: Inputs, period: int) -> list[Finding]:
+    """Holds readings of the loops to their period."""
+    log = inputs.log
+    told = log.of_kind(READING)
+    due = np.arange(period, log.end_step + 1, period)
+    for k in range(max(len(told), len(due))):
+        if k >= len(told) or k >= len(due) or log.step[told[k]] != due[k]:
+            row = int(told[k]) if k < len(told) else log.frame.height - 1
+            text = "no reading is due any more"
+            if k < len(due):
+                text = f"the reading of {due[k] * inputs.step_s:.3f} s is due here"
+            return [finding(log, row, DECISION, text)]
+    return []
 
 
 def check_acknowledgements(inputs: Inputs) -> Check:
@@ -144,8 +165,9 @@ def check_acknowledgements(inputs: Inputs) -> Check:
     findings = []
     for row, key in zip(rows.tolist(), zip(log.vehicle[rows], of_step, strict=True), strict=True):
         waiting = open_orders.get(key, [])
-        if not waiting or waiting[0] > row:
-            text = "acknowledges what was not commanded"
+        moved = log.step[row] == key[1] and waiting[:1] != [row - 1]
+        if not waiting or waiting[0] > row or moved:
+            text = "acknowledges what was not commanded just before"
             findings.append(finding(log, row, "a commitment", text))
             continue
         waiting.pop(0)

@@ -78,15 +78,15 @@ def check_completeness(inputs: Inputs, motion: Motion) -> Check:
     """Looks for reports that are missing, or told twice."""
     log, end_m, period = inputs.log, inputs.scenario.mainline.end_m, report_steps(inputs.step_s)
     reports = log.of_kind(REPORT)
-    reports = reports[np.isnan(log.numbers("accel_mps2")[reports])]
+    obeying = ~np.isnan(log.numbers("accel_mps2")[reports])
     due = due_reports(motion, end_m, inputs.step_s, period, log.end_step)
-    findings = _unmatched(inputs, reports, due, "report")
-    told = len(reports)
-    if not inputs.exact:
+    findings = _unmatched(inputs, reports[~obeying], due, "report")
+    told = len(reports) - int(obeying.sum())
+    if len(inputs.orders.vehicle) and not inputs.exact:
         compared = log.of_kind(COMPARISON)
         expected = expected_comparisons(inputs.orders, end_m, inputs.step_s, log.end_step)
         findings += _unmatched(inputs, compared, expected, "comparison")
-        findings += _not_driven_on(inputs)
+        findings += [*_not_driven_on(inputs), *_told_twice(inputs, reports[obeying])]
         told += len(compared)
     how = f"{told} reports: once a second of each vehicle on the road"
     return judged("reports are complete", how, sorted(findings, key=lambda f: f.row or 0))
@@ -103,11 +103,7 @@ def _unmatched(inputs: Inputs, rows: IntArray, due: IntArray, what: str) -> list
         who, when_s = log.vehicle_id(vehicle), step * inputs.step_s
         text = f"before it the {what} of {who} at {when_s:.3f} s is missing"
         findings.append(finding(log, after, COMMITMENT, text))
-    _, first = np.unique(told_keys, return_index=True)
-    findings += [
-        finding(log, int(rows[k]), COMMITMENT, "is told twice")
-        for k in np.setdiff1d(np.arange(len(rows)), first).tolist()
-    ]
+    findings += _told_twice(inputs, rows)
     if what == "report":
         odd = log.step[rows] % report_steps(inputs.step_s) != 0
         findings += [
@@ -115,6 +111,17 @@ def _unmatched(inputs: Inputs, rows: IntArray, due: IntArray, what: str) -> list
             for row in rows[odd].tolist()
         ]
     return findings
+
+
+def _told_twice(inputs: Inputs, rows: IntArray) -> list[Finding]:
+    """Returns positions that a vehicle tells again: of one time, and at one time."""
+    log = inputs.log
+    keys = np.column_stack([log.vehicle[rows], log.step[rows], log.numbers("of_s")[rows]])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return [
+        finding(log, int(rows[k]), COMMITMENT, "is told twice")
+        for k in np.setdiff1d(np.arange(len(rows)), first).tolist()
+    ]
 
 
 def _keys(vehicle: IntArray, step: IntArray, end_step: int) -> IntArray:
@@ -192,12 +199,12 @@ def check_trajectories(inputs: Inputs, motion: Motion) -> Check:
     return judged("trajectories.parquet", f"{table.height} pieces are those commanded", findings)
 
 
-def check_positions(inputs: Inputs) -> Check:
-    """Compares the reports of drivers with ``positions.parquet``."""
+def check_positions(inputs: Inputs) -> list[Check]:
+    """Compares the reports of drivers with ``positions.parquet``, and looks for missing ones."""
     log, table = inputs.log, inputs.run.positions
     if table is None:
         missing = Finding("the run's folder", "positions.parquet is missing")
-        return judged("reports", "", [missing])
+        return [judged("reports", "", [missing])]
     number = {log.vehicle_id(k): k for k in range(len(log.requests))}
     table = table.with_columns(number=pl.col("vehicle_id").replace_strict(number, default=-1))
     table = table.filter(pl.col("number") >= 0).sort("number", "time_s", maintain_order=True)
@@ -206,8 +213,9 @@ def check_positions(inputs: Inputs) -> Check:
     rows = np.column_stack([table[name].fill_null(np.nan).to_numpy() for name in columns])
     first = np.searchsorted(vehicle, np.arange(len(log.requests) + 1)).astype(np.int64)
     reports = log.of_kind(REPORT)
+    motion = Motion(first, np.ascontiguousarray(rows))
     off = off_the_order(
-        Motion(first, np.ascontiguousarray(rows)),
+        motion,
         log.vehicle[reports],
         log.numbers("time_s")[reports],
         log.numbers("station_m")[reports],
@@ -218,7 +226,7 @@ def check_positions(inputs: Inputs) -> Check:
         for k in np.flatnonzero(~(np.abs(off[:, 0]) <= SAMPLED_M)).tolist()
     ]
     how = f"{len(reports)} reports within {SAMPLED_M:g} m of positions.parquet"
-    return judged("reports", how, findings)
+    return [judged("reports", how, findings), check_completeness(inputs, motion)]
 
 
 def ordered(inputs: Inputs) -> Motion:

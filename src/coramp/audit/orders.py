@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.checker.distances import passes_s
 
 SLIVER_S = 1e-9
 """An order that takes over within this time of a knot leaves no piece of that length behind."""
@@ -108,6 +107,26 @@ def exits_s(first: IntArray, rows: FloatArray, zone_end_m: float) -> FloatArray:
         if first[v + 1] > first[v]:
             found[v] = passes_s(rows[first[v] : first[v + 1]], zone_end_m)
     return found
+
+
+@kernel
+def passes_s(pieces: FloatArray, station_m: float) -> float:
+    """Returns when a station is passed, infinity for never; speeds are at least 0.
+
+    The way d takes ``2 d / (v + sqrt(v^2 + 2 a d))``, a form that holds for the smallest a too.
+    """
+    for k in range(len(pieces)):
+        t, s, v, a = pieces[k]
+        way_m = station_m - s
+        if way_m <= 0.0:
+            return float(t)
+        under = v * v + 2.0 * a * way_m
+        if under < 0.0 or v + math.sqrt(under) <= 0.0:
+            continue
+        passed_s = t + 2.0 * way_m / (v + math.sqrt(under))
+        if k + 1 == len(pieces) or passed_s <= pieces[k + 1, 0]:
+            return float(passed_s)
+    return math.inf
 
 
 @kernel

@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.audit.orders import Motion, Orders, place_in, under_way
-from coramp.checker.distances import passes_s
+from coramp.audit.orders import Motion, Orders, passes_s, place_in, under_way
 
 NEAR_THE_END_M = 0.3
 """Who is nearer to the zone's end than this may have left, or not: a report is not missed."""
@@ -44,24 +43,21 @@ def due_reports(
 ) -> IntArray:
     """Returns who must report when, shape (n, 2): vehicle and step, each period after its entry."""
     vehicles = len(motion.first) - 1
-    found = np.empty((vehicles * (end_step // period + 1), 2), np.int64)
+    begins, ends = np.zeros(vehicles, np.int64), np.zeros(vehicles, np.int64)
+    for v in range(vehicles):
+        own = motion.rows[motion.first[v] : motion.first[v + 1]]
+        if len(own) == 0:
+            continue
+        begins[v] = round(own[0, 0] / step_s) // period + 1
+        last_s = min(passes_s(own, zone_end_m - NEAR_THE_END_M), end_step * step_s)
+        ends[v] = max(begins[v], math.floor(last_s / step_s / period + 1e-9) + 1)
+    found = np.empty((np.sum(ends - begins), 2), np.int64)
     n = 0
     for v in range(vehicles):
-        begin, end = motion.first[v], motion.first[v + 1]
-        if end == begin:
-            continue
-        entry = round(motion.rows[begin, 0] / step_s)
-        piece = begin
-        for step in range((entry // period + 1) * period, end_step + 1, period):
-            now_s = step * step_s
-            while piece + 1 < end and motion.rows[piece + 1, 0] <= now_s:
-                piece += 1
-            station_m, _ = place_in(motion.rows, piece, now_s)
-            if station_m > zone_end_m - NEAR_THE_END_M:
-                break
-            found[n, 0], found[n, 1] = v, step
+        for k in range(begins[v], ends[v]):
+            found[n, 0], found[n, 1] = v, k * period
             n += 1
-    return found[:n].copy()
+    return found
 
 
 def expected_comparisons(

@@ -28,6 +28,7 @@ from coramp.worlds.outcomes import (
     cap_step_of,
     cooperative_outcome,
     passages_of,
+    step_after,
     step_after_last_exit,
 )
 from coramp.worlds.sumo.cooperative import CooperativePlant
@@ -183,6 +184,11 @@ def run_uncontrolled(
     )
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
+    told = None
+    if options.keep_messages:
+        last_s = float(np.max(exit_s, initial=0.0)) if left else math.inf
+        end_step = min(cap_step, step_after(last_s, step_s))
+        told = _told_of_drivers(arrivals, samples, meter, step_s, end_step)
     return Outcome(
         cooperative=False,
         passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
@@ -191,19 +197,24 @@ def run_uncontrolled(
         driven=Pieces(first, rows),
         end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
         collisions=collisions,
-        told=_told_of_drivers(arrivals, samples, meter, step_s) if options.keep_messages else None,
+        told=told,
     )
 
 
 def _told_of_drivers(
-    arrivals: Sequence[Arrival], samples: Samples, meter: Meter | None, step_s: float
+    arrivals: Sequence[Arrival],
+    samples: Samples,
+    meter: Meter | None,
+    step_s: float,
+    end_step: int,
 ) -> Told:
     """Returns the messages of a run of drivers, who are reported and never commanded."""
     positions = reports_of_samples(*_motion_of(samples), step_s)
-    last = round(samples.time_s.max(initial=0.0) / step_s)
-    signals, readings = ([], []) if meter is None else (meter.signals, meter.readings)
-    last = max(last, *(round(reading.time_s / step_s) for reading in readings), 0)
-    return Told(arrivals, signals, positions, readings, last)
+    if meter is None:
+        return Told(arrivals, [], positions, [], end_step)
+    signals = [signal for signal in meter.signals if signal.step <= end_step]
+    readings = [r for r in meter.readings if round(r.time_s / step_s) <= end_step]
+    return Told(arrivals, signals, positions, readings, end_step)
 
 
 def _passing_times(
