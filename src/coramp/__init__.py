@@ -35,4 +35,13 @@ def __getattr__(name: str) -> Any:
         from coramp import api
 
         return getattr(api, name)
+    if name == "__version__":
+        from importlib import metadata
+
+        return metadata.version("coramp")
     raise AttributeError(f"module 'coramp' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Returns what the module offers, the API too, so that completion finds it."""
+    return sorted({*(name for name in globals() if name.startswith("__")), *__all__, "__version__"})

@@ -10,8 +10,9 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.explain.decision import Quantity, quantities
-from coramp.records.files import made_folder, staged_folder
-from coramp.records.run_folder import MARK, write_run
+from coramp.records.files import made_folder
+from coramp.records.run_folder import SUMO, not_replaceable, write_run
+from coramp.records.staging import staged_folder
 from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
 from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
 from coramp.runs.planning import PlannedSnapshot, plan_snapshot
@@ -152,7 +153,8 @@ def run(
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
     run (default: fair). ``keep_messages`` keeps what the coordinator was told and commanded, for
-    ``coramp audit``. ``notice`` is told beforehand where demand is above the lane's limit.
+    ``coramp audit``. ``notice`` is told beforehand where demand is above the lane's limit, and
+    afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
@@ -176,16 +178,18 @@ def run(
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if out is None:
-        return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages))
-    with staged_folder(Path(out), MARK) as stage:
-        keep_in = stage / "sumo" if keep_sumo else None
-        result = _executed(spec, SumoOptions(keep_in, gui, keep_messages))
+        return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages), notice)
+    with staged_folder(Path(out), not_replaceable) as stage:
+        options = SumoOptions(stage / SUMO if keep_sumo else None, gui, keep_messages)
+        result = _executed(spec, options, notice)
         write_run(stage, result)
     return result
 
 
-def _executed(spec: RunSpec, options: SumoOptions) -> RunResult:
-    records = recorded(spec, options)
+def _executed(
+    spec: RunSpec, options: SumoOptions, notice: Callable[[str], None] | None
+) -> RunResult:
+    records = recorded(spec, options, notice or (lambda _: None))
     return RunResult(**{f.name: getattr(records, f.name) for f in fields(records)}, spec=spec)
 
 

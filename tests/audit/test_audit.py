@@ -16,7 +16,7 @@ from tests.edges import invoke
 
 COOPERATIVE = [name for name, strategy in strategies().items() if strategy.cooperative]
 STEP_S = 0.1
-CLAIMS = 25
+CLAIMS = 27
 SHORT = {"mainline_veh_h": 1500, "ramp_veh_h": 600, "horizon_s": 40, "keep_messages": True}
 
 

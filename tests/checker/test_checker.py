@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from coramp.checker.checker import Change, Vehicles, examine
+from coramp.checker.checker import Change, examine
 from coramp.checker.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
 from coramp.checker.reasons import (
     ACCEPTED,
@@ -32,6 +32,7 @@ from coramp.checker.reasons import (
     TOO_NEAR,
     TOO_NEAR_AT_MERGE,
 )
+from coramp.checker.record import LIVE, empty_record, note_entry
 from tests.checker.test_distances import BOUNDS
 from tests.mathematics import close, pieces, sampled
 
@@ -54,40 +55,36 @@ class New(NamedTuple):
     pieces: np.ndarray
     merge_s: float
     makes_gap: int = 0
-    start: tuple = ()
 
 
 def traffic(*vehicles, live=None):
-    """Commitments of ``(pieces, merge time)``, 5 m long unless a length follows."""
-    ways = [vehicle[0] for vehicle in vehicles]
-    counts = [len(way) for way in ways]
-    return Vehicles(
-        pieces=np.concatenate(ways),
-        first=np.cumsum([0, *counts[:-1]]),
-        piece_count=np.array(counts),
-        length_m=np.array([vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]),
-        merge_s=np.array([vehicle[1] for vehicle in vehicles]),
-        live=np.arange(len(ways)) if live is None else np.array(live, np.int64),
-    )
+    """What was told of ``(pieces, merge time)``, 5 m long unless a length follows."""
+    record = empty_record(len(vehicles) + 1, 1000)
+    for vehicle in vehicles:
+        length_m = vehicle[2] if len(vehicle) > 2 else 5.0
+        note_entry(record, length_m, vehicle[1], vehicle[0], BOUNDS.zone_end_m)
+    if live is not None:
+        record.live[: len(live)] = live
+        record.used[LIVE] = len(live)
+    return record
 
 
 ROAD = ((X_WAY, STREAM), (Y_WAY, STREAM), (R_WAY, UNDECIDED), (Q_WAY, UNDECIDED))
 
 
-def verdict(*new, vehicles=ROAD, live=None, earliest_s=1.0, bounds=BOUNDS):
+def verdict(*new, vehicles=ROAD, live=None, now_s=-math.inf, earliest_s=1.0, bounds=BOUNDS):
     buffer = np.zeros((len(new), 12, 4))
     for k, one in enumerate(new):
         buffer[k, : len(one.pieces)] = one.pieces
-    starts = [one.start or tuple(one.pieces[0, :3]) for one in new]
     change = Change(
         rows=np.array([one.row for one in new]),
         piece_count=np.array([len(one.pieces) for one in new]),
         pieces=buffer,
         merge_s=np.array([one.merge_s for one in new]),
-        start=np.array(starts),
         makes_gap=np.array([one.makes_gap for one in new]),
     )
-    return examine(traffic(*vehicles, live=live), change, earliest_s, bounds)
+    record = traffic(*vehicles, live=live)
+    return examine(record, change, now_s, earliest_s, bounds)
 
 
 def alone(way, merge_s=STREAM, makes_gap=0, committed=None, committed_merge_s=None):
@@ -153,7 +150,7 @@ def test_merge_time_must_be_a_number():
 
 
 def test_there_must_be_pieces():
-    assert verdict(New(R, MERGE[:0], 12.0, start=(1.0, -144.0, 16.0))).code == NOT_FINITE
+    assert verdict(New(R, MERGE[:0], 12.0)).code == NOT_FINITE
 
 
 def test_later_entries_are_examined_too():
@@ -199,13 +196,14 @@ def test_nothing_that_is_driven_may_be_missing():
     assert verdict(New(X, later, STREAM), earliest_s=5.0).code == ACCEPTED
 
 
-@pytest.mark.parametrize("column", range(3))
+@pytest.mark.parametrize("column", [1, 2])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_start_must_be_where_the_vehicle_is(column, side):
     for size, code in ((2e-6, LEAVES_ITS_PATH), (5e-7, ACCEPTED)):
-        start = [1.0, -144.0, 16.0]
-        start[column] += side * size
-        assert verdict(New(R, MERGE, 12.0, start=tuple(start))).code == code
+        told = R_WAY.copy()
+        told[:2, column] += side * size
+        road = (*ROAD[:2], (told, UNDECIDED), *ROAD[3:])
+        assert verdict(New(R, MERGE, 12.0), vehicles=road).code == code
 
 
 # the past -----------------------------------------------------------------------------------

@@ -3,8 +3,9 @@
 import numpy as np
 import polars as pl
 import pytest
-from coramp.loading import load_scenario
-from coramp.running import execute, make_spec
+
+from coramp.runs.running import execute, make_spec
+from coramp.scenarios.loading import load_scenario
 
 SLOW_RAMP = {"ramp.entry_speed_mps": [1.0, 12.0]}
 

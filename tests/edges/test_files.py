@@ -1,7 +1,6 @@
 import json
 import math
 import os
-import stat
 
 import polars as pl
 import pytest
@@ -12,7 +11,6 @@ from coramp import CorampError
 from coramp.records.files import (
     made_folder,
     read_json,
-    staged_folder,
     write_json,
     write_parquet,
     write_text,
@@ -140,75 +138,3 @@ def test_a_folder_cannot_be_made_where_a_file_is(tmp_path):
     for path in (tmp_path / "a", tmp_path / "a" / "b"):
         with pytest.raises(CorampError, match=r"cannot be written: .*; give another folder"):
             made_folder(path)
-
-
-class TestStagedFolder:
-    @staticmethod
-    def fail_within(target, error):
-        with staged_folder(target, "mark") as stage:
-            (stage / "mark").write_text("half")
-            raise error
-
-    def test_it_appears_once_all_is_written(self, tmp_path):
-        target = tmp_path / "above" / "target"
-        with staged_folder(target, "mark") as stage:
-            (stage / "mark").write_text("x")
-            assert not target.exists()
-        assert everything_below(tmp_path) == ["above", "above/target", "above/target/mark"]
-        assert stat.S_IMODE(target.stat().st_mode) == 0o755
-
-    @pytest.mark.parametrize("error", [CorampError, Stopped])
-    def test_what_fails_leaves_the_folder_before_it(self, tmp_path, error):
-        target = tmp_path / "target"
-        with staged_folder(target, "mark") as stage:
-            (stage / "mark").write_text("before")
-        with pytest.raises(error):
-            self.fail_within(target, error)
-        assert everything_below(tmp_path) == ["target", "target/mark"]
-        assert (target / "mark").read_text() == "before"
-
-    def test_what_fails_at_first_leaves_nothing(self, tmp_path):
-        with pytest.raises(Stopped):
-            self.fail_within(tmp_path / "target", Stopped)
-        assert everything_below(tmp_path) == []
-
-    def test_its_own_folder_is_replaced_as_a_whole(self, tmp_path):
-        target = tmp_path / "target"
-        target.mkdir()
-        (target / "mark").write_text("before")
-        (target / "old").write_text("before")
-        with staged_folder(target, "mark") as stage:
-            (stage / "mark").write_text("after")
-        assert everything_below(tmp_path) == ["target", "target/mark"]
-        assert (target / "mark").read_text() == "after"
-
-    def test_an_empty_folder_is_used(self, tmp_path):
-        target = tmp_path / "target"
-        target.mkdir()
-        with staged_folder(target, "mark") as stage:
-            (stage / "mark").write_text("x")
-        assert everything_below(target) == ["mark"]
-
-    @pytest.mark.parametrize(
-        ("name", "what"), [("letter", r"other files \(letter\)"), ("study.json", "a study")]
-    )
-    def test_foreign_files_are_refused_before_anything_is_done(self, tmp_path, name, what):
-        target = tmp_path / "target"
-        target.mkdir()
-        (target / name).write_text("dear")
-        with (
-            pytest.raises(CorampError, match=f"holds {what}; give another or an empty folder"),
-            staged_folder(target, "mark"),
-        ):
-            pytest.fail("nothing may be computed")
-        assert everything_below(tmp_path) == ["target", f"target/{name}"]
-
-    def test_a_file_is_refused(self, tmp_path):
-        target = tmp_path / "target"
-        target.write_text("dear")
-        with (
-            pytest.raises(CorampError, match="is a file; give a folder"),
-            staged_folder(target, "mark"),
-        ):
-            pytest.fail("nothing may be computed")
-        assert target.read_text() == "dear"

@@ -18,7 +18,7 @@ def test_a_line_of_highs_does_not_get_into_json():
 def test_native_lines_go_to_stderr_and_pythons_own_stay():
     code = (
         "import os\n"
-        "from coramp.native_output import send_native_output_to_stderr\n"
+        "from coramp.cli.native_output import send_native_output_to_stderr\n"
         "send_native_output_to_stderr()\n"
         "os.write(1, b'native\\n')\n"
         "print('own')\n"

@@ -10,7 +10,12 @@ from coramp import CorampError
 from coramp.scenarios.checks import decision_station_range_m, is_multiple
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.toml_files import builtin_names, parse_overrides, with_overrides
+from coramp.scenarios.toml_files import (
+    builtin_names,
+    override_text,
+    parse_overrides,
+    with_overrides,
+)
 from tests.edges import built_in, edited
 
 PAPER = load_scenario("paper")
@@ -293,6 +298,31 @@ def test_settings_are_toml_or_plain_text(text, key, value):
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_settings_keep_every_digit(value):
     assert parse_overrides([f"k={value!r}"]) == {"k": value}
+
+
+settings_given = st.recursive(
+    st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(codec="utf-8", exclude_characters="\x7f")),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text("ab .-"), inner, max_size=3)
+    ),
+    max_leaves=5,
+)
+
+
+@given(settings_given)
+def test_a_setting_is_read_back_from_its_text(value):
+    text = override_text("a.b", value)
+    assert "\n" not in text
+    assert parse_overrides([text]) == {"a.b": value}
+
+
+def test_the_text_of_a_setting_is_as_one_would_write_it():
+    assert override_text("a.b", [16.0, 19.0]) == "a.b=[16.0, 19.0]"
+    assert override_text("control.gap_position", "front") == "control.gap_position=front"
+    assert override_text("name", "1.0") == 'name="1.0"'
 
 
 def test_overriding_leaves_the_original_alone():

@@ -4,6 +4,7 @@
 rounding.
 """
 
+import os
 import subprocess
 import sys
 
@@ -15,7 +16,9 @@ from tests.kept_rows.specs import kept_runs
 
 def main() -> int:
     runs = kept_runs()
-    made = Parallel(n_jobs=-1, return_as="generator")(delayed(row_of)(run) for run in runs)
+    made = Parallel(n_jobs=int(os.environ.get("JOBS", "-1")), return_as="generator")(
+        delayed(row_of)(run) for run in runs
+    )
     rows = []
     for number, row in enumerate(made, 1):
         rows.append(row)

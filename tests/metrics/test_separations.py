@@ -5,8 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coramp.metrics.margins import least_margin_m
 from coramp.metrics.separations import closing_extremes
 from coramp.metrics.tables import safety_figures
+from coramp.vehicles.separation import smallest_margin_m
+from tests.mathematics import SAFETY, random_pairs
 from tests.metrics import NEVER, PAPER, Car, outcome_of
 
 FRICTION = 254.0 * (0.4 + 0.11)
@@ -44,6 +47,24 @@ def test_a_slower_follower_has_a_margin_alone():
     found = figures(steady("m1", 100.0, 20.0, 5.0), steady("m2", 94.5, 20.0, 5.0))
     assert found["min_margin_m"] == pytest.approx(0.5 - eq_1(20.0, 20.0))
     assert (found["min_ttc_s"], found["max_drac_mps2"]) == (None, 0.0)
+
+
+@pytest.mark.parametrize(("short_m", "counted"), [(1e-12, 0), (1e-9, 0), (1e-6, 1), (1e-3, 1)])
+def test_rounding_is_no_violation_and_a_thousandth_of_a_millimetre_is(short_m, counted):
+    rear_m = 95.0 - eq_1(20.0, 20.0) + short_m
+    found = figures(steady("m1", 100.0, 20.0, 5.0), steady("m2", rear_m, 20.0, 5.0))
+    assert found["min_margin_m"] == pytest.approx(-short_m, abs=1e-10)
+    assert found["safety_violations"] == counted
+
+
+@pytest.mark.parametrize(("short_m", "counted"), [(1e-9, 0), (1e-6, 1)])
+def test_rounding_is_no_violation_at_a_lane_change_either(short_m, counted):
+    ahead_m = 100.0 + 5.0 + eq_15(19.0, 20.0) - short_m
+    found = figures(
+        steady("m1", ahead_m - 20.0, 20.0, 1.5),
+        steady("r1", 100.0 - 19.0, 19.0, 1.5, merge_s=1.0),
+    )
+    assert found["safety_violations"] == counted
 
 
 def test_the_order_of_vehicles_in_the_records_does_not_matter():
@@ -221,3 +242,38 @@ def test_ttc_and_drac_are_the_exact_extremes(v1, v2, a1, a2, t1, t2, gap):
     if math.isfinite(sampled_ttc) and sampled_ttc < 1e3:
         assert ttc_s == pytest.approx(sampled_ttc, rel=0.01)
         assert drac_mps2 == pytest.approx(sampled_drac, rel=0.01, abs=1e-9)
+
+
+def test_planners_and_figures_read_the_safe_distance_alike():
+    for front, rear, start_s, lasts_s in random_pairs(7, 200):
+        ours_m, when_s = least_margin_m(front, 5.0, rear, start_s, start_s + lasts_s, SAFETY)
+        theirs_m, _ = smallest_margin_m(front, 5.0, rear, start_s, start_s + lasts_s, SAFETY)
+        assert ours_m == pytest.approx(theirs_m, abs=1e-9)
+        assert start_s <= when_s <= start_s + lasts_s
+
+
+@pytest.mark.parametrize("too_near_m", [1e-7, 0.002, 0.5])
+def test_every_violation_counts_and_shows_in_the_margin(too_near_m):
+    gap_m = eq_1(20.0, 20.0) - too_near_m
+    found = figures(steady("m1", 100.0, 20.0, 5.0), steady("m2", 95.0 - gap_m, 20.0, 5.0))
+    assert found["safety_violations"] == 1
+    assert found["min_margin_m"] == pytest.approx(-too_near_m, abs=1e-9)
+    assert found["min_margin_equation"] == 1
+
+
+@pytest.mark.parametrize(("ahead_m", "equation"), [(5.5, 15), (-5.5, 16)])
+def test_a_lane_change_that_is_too_near_shows_in_the_margin_with_its_equation(ahead_m, equation):
+    # 0.5 m between bumpers at 20 m/s each: Eq. 1 asks for 0.04 m, Eq. 15 and 16 for 0.76 m
+    merging = Car("r1", ((0.0, -50.0, 20.0, 0.0),), merge_s=5.0, exit_s=9.0)
+    found = figures(steady("m1", -50.0 + ahead_m, 20.0, 9.0), merging)
+    assert found["safety_violations"] == 1
+    assert found["min_margin_m"] == pytest.approx(0.5 - eq_15(20.0, 20.0))
+    assert found["min_merge_margin_m"] == found["min_margin_m"]
+    assert found["min_margin_equation"] == equation
+
+
+def test_without_a_violation_the_margin_is_over_eq_1():
+    found = figures(steady("m1", 100.0, 20.0, 5.0), steady("m2", 80.0, 20.0, 5.0))
+    assert found["safety_violations"] == 0
+    assert found["min_margin_equation"] == 1
+    assert found["min_merge_margin_m"] is None

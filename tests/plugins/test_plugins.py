@@ -335,9 +335,10 @@ def installed(folder, name, module, source, entry):
 
 
 def coramp_with(folder, *words):
+    search = [str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.run(
-        [sys.executable, "-c", "from coramp.cli.commands import main; main()", *words],
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        [sys.executable, "-c", "from coramp.cli import main; main()", *words],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
         capture_output=True,
         text=True,
         check=False,
@@ -367,6 +368,98 @@ def test_installed_strategies_are_listed_with_their_origin_and_broken_ones_left_
     study = coramp_with(site, "study", str(tmp_path / "s.toml"), "--seeds", "2", "--jobs", "2",
                         "--out", str(tmp_path / "out"))  # fmt: skip
     assert study.returncode == 0, study.stderr
+
+
+LEAVING = "import sys\nsys.exit('no licence')\n"
+COLOURED = """
+class Coloured:
+    name = "coloured"
+    summary = "a \\x1b[31mred\\x1b[0m word,\\x07 a bell\\n and a new line\\x9b2J"
+    cooperative = True
+    def decide(self, view, memory): ...
+"""
+BROKEN_CLASS = """
+class Meta(type):
+    @property
+    def summary(cls):
+        raise SystemExit("\\x1b]0;title\\x07")
+class Touchy(metaclass=Meta):
+    name, cooperative = "touchy", True
+    def decide(self, view, memory): ...
+"""
+
+
+def test_one_that_exits_at_import_does_not_silence_the_others(tmp_path):
+    installed(tmp_path, "leaving", "coramp_leaving", LEAVING, "Leaving")
+    installed(tmp_path, "touchy", "coramp_touchy", BROKEN_CLASS, "Touchy")
+    listed = coramp_with(tmp_path, "strategies")
+    assert listed.returncode == 0
+    assert "mainline-priority" in listed.stdout
+    assert "leaving" not in listed.stdout
+    left_out = "Left out: strategy leaving of coramp-leaving 0.3: SystemExit: no licence"
+    assert left_out in listed.stderr.splitlines()
+    assert "Left out: strategy touchy of coramp-touchy 0.3: SystemExit: \\x1b]0;title\\x07" in (
+        listed.stderr
+    )
+    run = coramp_with(tmp_path, "run", "paper", "--strategy", "leaving")
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: strategy leaving of coramp-leaving 0.3: SystemExit")
+
+
+def test_a_summary_cannot_control_the_terminal(tmp_path):
+    installed(tmp_path, "coloured", "coramp_coloured", COLOURED, "Coloured")
+    listed = coramp_with(tmp_path, "strategies")
+    (line,) = [line for line in listed.stdout.splitlines() if line.startswith("  coloured ")]
+    assert all(character.isprintable() for character in line)
+    assert "a \\x1b[31mred\\x1b[0m word,\\x07 a bell and a new line\\x9b2J" in line
+
+
+def without_end(_):
+    def deeper():
+        deeper()
+
+    deeper()
+
+
+def without_end_and_a_higher_limit(_):
+    sys.setrecursionlimit(10**9)
+    without_end(_)
+
+
+def without_end_and_swallowing_everything(_):
+    def deeper():
+        try:
+            deeper()
+        except:  # noqa: E722 - as a very careless strategy does
+            deeper()
+
+    deeper()
+
+
+@pytest.mark.parametrize(
+    "recursion", [without_end_and_a_higher_limit, without_end_and_swallowing_everything]
+)
+def test_the_time_limit_ends_recursion(recursion):
+    limit, started = sys.getrecursionlimit(), time.perf_counter()
+    with pytest.raises(TooLong), time_limit(0.2):
+        recursion(None)
+    assert time.perf_counter() - started < 10.0
+    assert sys.getrecursionlimit() == limit
+
+
+def test_recursion_that_python_ends_is_told_as_such(quick_guard):
+    wrong = strategy_that_is(without_end)
+    coramp.register(wrong)
+    with pytest.raises(CorampError, match=r"at .* s it raises RecursionError: maximum recursion"):
+        coramp.run("paper", wrong.name, engine="exact", mainline_veh_h=1300, horizon_s=60)
+
+
+def test_recursion_within_reason_is_let_be():
+    def deep(left):
+        return 1 + deep(left - 1) if left else 0
+
+    with time_limit(5.0):
+        assert deep(800) == 800
 
 
 def test_the_skeleton_keeps_the_contract(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from coramp.report.capacity_figure import capacity_figure
 from coramp.report.flow_figures import delay_figure, flows_of, gain_figure, rung_figure
 from coramp.report.sensitivity_figure import sensitivity_figure, settings_of
 from coramp.report.style import look_of
-from tests.study import run_row, runs_of
+from tests.study import overridden, run_row, runs_of
 
 FLOWS = [(800.0, 200.0), (1800.0, 500.0)]
 T_2 = 4.302652729911275
@@ -132,7 +132,7 @@ def test_rungs_are_shares_of_all_merges_on_top_of_each_other(runs):
 
 def setting(text, mainline, ramp=0.3, seed=1):
     row = delays("mainline-priority", (1800.0, 500.0), mainline, ramp, seed=seed)
-    return {**row, "overrides": text, "run_id": f"{text}{seed}"}
+    return {**overridden(row, text), "run_id": f"{text}{seed}"}
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +175,7 @@ def test_capacity_has_a_line_a_combination_in_the_strategys_colour():
     for text in (None, "safety.time_gap_s=1.0"):
         for flow, delay in ((1200.0, 0.1), (1400.0, 9.0 if text else 0.1), (1600.0, 9.0)):
             row = delays("mainline-priority", (flow, 500.0), delay, 0.1)
-            rows.append({**row, "overrides": text})
+            rows.append(overridden(row, text))
     rows += [
         delays("uncontrolled", (flow, 500.0), delay, 0.1, drivers="fair")
         for flow, delay in ((1200.0, 0.1), (1600.0, 9.0))
@@ -202,7 +202,7 @@ def test_capacity_shows_what_the_lane_carries_where_it_lies_within_the_range():
         for ramp in (200.0, 1000.0):
             for flow, delay in ((1200.0, 0.1), (3000.0, 9.0)):
                 row = delays("mainline-priority", (flow, ramp), delay, 0.1)
-                rows.append({**row, "overrides": text, "lane_limit_veh_h": limit})
+                rows.append({**overridden(row, text), "lane_limit_veh_h": limit})
     (axes,) = capacity_figure(runs_of(*rows)).axes
     dotted = [line for line in axes.get_lines() if line.get_linestyle() == ":"]
     assert [line.get_xydata().tolist() for line in dotted] == [[[200.0, 2664.0], [1000.0, 1864.0]]]

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coramp.coordination.book import add_row
 from coramp.coordination.ledger import Ledger
 from coramp.road.rules import packed
 from coramp.scenarios.loading import load_scenario
@@ -43,7 +44,7 @@ def on_the_road(*vehicles):
     """The platoon of vehicles ``(stream, station, speed)`` that cruise or, on the ramp, stop."""
     ledger = Ledger(20.0, 400.0)
     for stream, station_m, speed_mps in vehicles:
-        row = ledger.add(LENGTH_M, stream == "r")
+        row = add_row(ledger.book, LENGTH_M, stream == "r")
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
         ledger.commit(row, pieces, math.inf if stream == "r" else -math.inf, 0.0)
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))

@@ -2,7 +2,9 @@
 
 import http.client
 import json
+import socket
 import threading
+import time
 import tomllib
 from contextlib import closing
 
@@ -12,6 +14,8 @@ from axe_playwright_python.sync_playwright import Axe
 import coramp
 from coramp.cli.commands import main
 from coramp.errors import CorampError
+from coramp.report.page.shown import played
+from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.studio.answers import Answers
 from coramp.studio.dials import studio_of
 from coramp.studio.server import StudioServer
@@ -132,6 +136,100 @@ def test_the_server_is_for_this_machine_only(server):
     assert (status, tomllib.loads(text)["ramp"]["acceleration_lane_m"]) == (200, 120.0)
     assert 'filename="paper-studio.toml"' in headers["Content-Disposition"]
     assert fetched(server, "/scenario.toml?lane=x")[0] == 400
+
+
+def raw(server, *pieces, wait_s=0.0, timeout_s=20.0):
+    """Sends bytes, with a pause after each piece, and returns all that comes back."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout_s) as connection:
+        received = b""
+        try:
+            for piece in pieces:
+                connection.sendall(piece)
+                time.sleep(wait_s)
+            while more := connection.recv(65536):
+                received += more
+        except ConnectionError:
+            pass
+        return received.decode()
+
+
+def head(server, target="/scenario.toml", *lines):
+    host = f"Host: 127.0.0.1:{server.server_port}"
+    return "\r\n".join([f"GET {target} HTTP/1.1", host, *lines, "", ""]).encode()
+
+
+@pytest.mark.parametrize("lines", [("Content-Length: {length}",), ("Transfer-Encoding: chunked",)])
+def test_a_body_is_never_read_as_a_request(server, lines):
+    second = head(server, "/nowhere")
+    asked = head(server, "/", *(line.format(length=len(second)) for line in lines))
+    answer = raw(server, asked + second)
+    assert answer.startswith("HTTP/1.1 400 Bad Request")
+    assert answer.count("HTTP/1.1") == 1
+    assert "Connection: close" in answer
+
+
+def test_an_address_that_is_none_is_answered(server):
+    answer = raw(server, head(server, "http://[bad/", "Connection: close"))
+    assert answer.startswith("HTTP/1.1 400 Bad Request")
+    assert answer.endswith("the address is not valid\n")
+
+
+@pytest.mark.parametrize("pieces", [(b"",), (b"GET / HT",), tuple(b"GET / HTTP/1.1\r\nX: y" * 9)])
+def test_slow_clients_hold_no_thread_for_ever(server, monkeypatch, pieces):
+    monkeypatch.setattr("coramp.studio.server.READ_S", 0.5)
+    monkeypatch.setattr("coramp.studio.server._Handler.timeout", 0.5)
+    pieces = [bytes([piece]) if isinstance(piece, int) else piece for piece in pieces]
+    started, before = time.perf_counter(), threading.active_count()
+    assert raw(server, *pieces, wait_s=0.02) == ""
+    assert time.perf_counter() - started < 5.0
+    time.sleep(0.2)
+    assert threading.active_count() <= before
+
+
+def test_a_heavy_run_holds_nobody_up(answers):
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Heavy(MainlinePriority):
+        name = "heavy"
+
+        def decide(self, view, memory):
+            begun.set()
+            go_on.wait(30.0)
+            return super().decide(view, memory)
+
+    coramp.register(Heavy, replace=True)
+    studio = Answers(studio_of("paper"))
+    found = []
+    heavy = threading.Thread(
+        target=lambda: found.append(told(studio, strategy="heavy", horizon=60, ramp=600))
+    )
+    heavy.start()
+    assert begun.wait(20.0)
+    started = time.perf_counter()
+    assert "table" in told(studio, horizon=60, ramp=600)
+    assert time.perf_counter() - started < 5.0
+    assert not found
+    go_on.set()
+    heavy.join(20.0)
+    assert "table" in found[0]
+
+
+def test_a_run_that_is_under_way_is_run_once(monkeypatch):
+    from coramp.studio import answers as module
+
+    runs, studio, found = [], Answers(studio_of("paper")), []
+    monkeypatch.setattr(module, "played", lambda spec: runs.append(spec) or played(spec))
+    threads = [
+        threading.Thread(target=lambda: found.append(told(studio, horizon=60, seed=9)))
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30.0)
+    assert len(found) == 4
+    assert len(runs) == 1
+    assert all(one == found[0] for one in found)
 
 
 def test_a_port_in_use_is_told_in_a_line(server, capsys):

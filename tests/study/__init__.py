@@ -1,8 +1,12 @@
 """Studies small enough for tests, and rows of runs made by hand."""
 
+import json
+import re
+
 import polars as pl
 
 from coramp.records.schemas import MEASURED, RUN_METRICS, RUNS
+from coramp.scenarios.toml_files import parse_overrides
 
 GRID = """
 name = "grid"
@@ -50,8 +54,22 @@ def run_row(
         "error": None,
         **metrics,
         "wall_s": 1.0,
+        "settings": settings_of(figures.get("overrides")),
         **figures,
     }
+
+
+def settings_of(overrides):
+    """Returns the column ``settings`` of a row whose column ``overrides`` is this text."""
+    if overrides is None:
+        return None
+    pairs = (part.split("=", 1) for part in re.split(r" (?=[a-z][\w.-]*=)", overrides))
+    return json.dumps(dict(parse_overrides([f"{key}={value}"]).popitem() for key, value in pairs))
+
+
+def overridden(row, overrides):
+    """Returns a row in which this was set."""
+    return {**row, "overrides": overrides, "settings": settings_of(overrides)}
 
 
 def runs_of(*rows):

@@ -13,7 +13,7 @@ from coramp.runs.running import make_spec
 from coramp.studies.breakdown import Bisection, bisections, broke_down
 from coramp.studies.capacity_layout import breakdowns, capacity_tables
 from coramp.studies.definition import Search, count_runs, load_study
-from tests.study import apart_from_time, run_row, runs_of, written
+from tests.study import apart_from_time, overridden, run_row, runs_of, written
 
 SEARCH = Search(
     strategies=["mainline-priority"],
@@ -128,7 +128,7 @@ def test_the_table_has_means_and_says_what_lies_outside():
     ],
 )
 def test_combinations_are_named_by_their_gaps(overrides, name):
-    given = {"overrides": overrides, "lane_limit_veh_h": 2604.9}
+    given = overridden({"lane_limit_veh_h": 2604.9}, overrides)
     runs = runs_of(*({**row, **given} for row in rows(1, 1500.0)))
     table = capacity_tables(runs)[0]
     assert table.rows == ((name, "2605", "1500"),)

@@ -2,14 +2,17 @@
 
 import os
 import signal
+import socketserver
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 from distributed import Client
 
 import coramp
+from coramp import CorampError
 from coramp.studies import cluster
 from tests.study import apart_from_time, written
 
@@ -107,4 +110,35 @@ def test_an_address_that_nobody_answers_is_told(address, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "ANSWER_S", 1)
     with pytest.raises(coramp.CorampError, match=f"--cluster: {address}: no Dask scheduler"):
         coramp.study(written(tmp_path, STUDY), cluster=address, out=tmp_path / "o")
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(
+    "greeting",
+    [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH_9.0\r\n", b"\xff" * 64, None],
+)
+def test_what_is_no_scheduler_is_told_in_a_line(tmp_path, greeting):
+    """Dask takes the first eight bytes for a length; None sends back what comes."""
+
+    class Other(socketserver.BaseRequestHandler):
+        def handle(self):
+            if greeting is not None:
+                self.request.sendall(greeting)
+            while content := self.request.recv(65536):
+                if greeting is None:
+                    self.request.sendall(content)
+
+    class Server(socketserver.ThreadingTCPServer):
+        daemon_threads = True
+
+        def handle_error(self, request, client_address):
+            """Dask hangs up."""
+
+    with Server(("127.0.0.1", 0), Other) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.server_address[1]}"
+        with pytest.raises(CorampError, match=r"--cluster: tcp://.*no Dask scheduler") as told:
+            coramp.study(written(tmp_path, STUDY), cluster=address, out=tmp_path / "o")
+        server.shutdown()
+    assert str(told.value).endswith("; allowed is an address like tcp://host:8786")
     assert not (tmp_path / "o").exists()

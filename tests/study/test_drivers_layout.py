@@ -4,6 +4,7 @@ import polars as pl
 import pytest
 
 from coramp.records.schemas import RUNS
+from coramp.runs.running import failed_row, make_spec
 from coramp.studies.definition import expand, load_study
 from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.overrides import overrides_of, setting_of
@@ -57,18 +58,18 @@ def test_no_runs_are_no_tables():
 
 
 def test_overrides_are_read_back_with_their_values():
-    text = "drivers.credible.tau_s=[0.9, 1.2] drivers.fair.integrator=ballistic ramp.start_m=-800.0"
-    found = overrides_of({"overrides": text})
-    assert found == {
+    overrides = {
         "drivers.credible.tau_s": [0.9, 1.2],
         "drivers.fair.integrator": "ballistic",
         "ramp.start_m": -800.0,
     }
-    run = {"scenario": "paper", "overrides": text}
+    spec = make_spec("paper", "uncontrolled", overrides=overrides)
+    run = failed_row(spec, "", 0.0)
+    assert overrides_of(run) == overrides
     assert setting_of(run, "ramp.start_m") == -800.0
     assert setting_of(run, "mainline.start_m") == -400.0
     assert setting_of(run, "mainline.nothing") is None
-    assert overrides_of({"overrides": None}) == {}
+    assert overrides_of({"settings": None}) == {}
 
 
 def test_the_study_raises_the_ramps_flow_by_the_same_in_each_hour():

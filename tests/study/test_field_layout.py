@@ -24,7 +24,7 @@ from coramp.studies.field_layout import (
     with_derived,
 )
 from coramp.studies.statistics import estimate
-from tests.study import run_row, runs_of
+from tests.study import overridden, run_row, runs_of
 
 FLOWS = [(800.0, 200.0), (2200.0, 700.0)]
 
@@ -185,7 +185,7 @@ def baseline_rows():
 
 
 def test_settings_are_the_scenarios_but_for_the_overrides():
-    row = {"scenario": "paper", "drivers": "fair", "overrides": "drivers.fair.sigma=0.0"}
+    row = overridden({"scenario": "paper", "drivers": "fair"}, "drivers.fair.sigma=0.0")
     found = settings_of(row)
     assert (found["sigma"], found["integrator"], found["tau_s"]) == (0.0, "euler", 1.0)
     assert found["ramp.acceleration_lane_m"] == 200.0

@@ -269,7 +269,7 @@ def test_a_run_that_must_fail_fails_alone():
 class Deadly:
     """A run that takes its process with it."""
 
-    run_id = "deadly"
+    run_id, settings = "deadly", None
     keys = {"scenario": "deadly", "strategy": "deadly"}  # noqa: RUF012
 
     @property

@@ -8,6 +8,7 @@ from coramp.studies.breakdown import BREAKDOWN_DELAY_S
 from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.lane_breakdown import lane_flows_veh_h, least_delay_s, mean_bound_s
 from coramp.studies.worth_layout import name_of, worth_tables
+from tests.study import settings_of
 
 FIGURES = {
     "mainline_delay_s": 1.0,
@@ -28,6 +29,7 @@ def run(strategy, drivers, overrides, delay_s, mainline=1200.0, **figures):
         "strategy": strategy,
         "drivers": drivers,
         "overrides": overrides,
+        "settings": settings_of(overrides),
         "mainline_veh_h": mainline,
         "ramp_veh_h": 300.0,
         "delay_s": delay_s,
@@ -87,6 +89,7 @@ def searched(strategy, flows, broken_from, overrides="safety.time_gap_s=1.4", se
             "strategy": strategy,
             "drivers": None,
             "overrides": overrides,
+            "settings": settings_of(overrides),
             "ramp_veh_h": 500.0,
             "seed": seed,
             "mainline_veh_h": flow,
@@ -103,7 +106,7 @@ def test_the_lane_breaks_down_where_its_least_delay_passes_the_limit():
     good = pl.DataFrame(searched("slots", [800.0, 1400.0, 1500.0, 2400.0], 1500.0))
     found = lane_flows_veh_h(good, 600.0)
     flow = found["paper", "safety.time_gap_s=1.4", 500.0, 1]
-    setting = ("paper", "safety.time_gap_s=1.4", 600.0, 500.0, 1)
+    setting = ("paper", settings_of("safety.time_gap_s=1.4"), 600.0, 500.0, 1)
     assert least_delay_s(*setting, flow) > BREAKDOWN_DELAY_S >= least_delay_s(*setting, flow - 100)
     rows = {row[0]: row[1:] for row in capacity_tables(good, 600.0)[1].rows}
     assert rows["the bound, 1.4 s"] == (f"{flow:.0f}",)

@@ -10,6 +10,8 @@ from coramp.audit.neighbours import (
     DRAC,
     GAP,
     MARGIN,
+    MERGE_FRONT,
+    MERGE_REAR,
     SEVERITY,
     TTC,
     VIOLATIONS,
@@ -60,10 +62,15 @@ def derive(
         np.fmin(passages.merge_s, until_s),
         np.minimum(until_s, exits_s(driven.first, driven.rows, lane_end_m)),
     )
+    mainline = lanes[0].extremes
+    merges = {15: float(mainline[MERGE_FRONT]), 16: float(mainline[MERGE_REAR])}
+    margin_m, equation = _least_margin(float(least[MARGIN]), merges)
     figures = {
         "unserved": float(np.isnan(passages.exit_s).sum()),
         "safety_violations": float(sum(lane.extremes[VIOLATIONS] for lane in lanes)),
-        "min_margin_m": _finite(least[MARGIN]),
+        "min_margin_m": _finite(margin_m),
+        "min_margin_equation": equation,
+        "min_merge_margin_m": _finite(min(merges.values())),
         "min_ttc_s": _finite(least[TTC]),
         "max_drac_mps2": float(most[DRAC]),
         "max_severity": float(lanes[0].extremes[SEVERITY]),
@@ -75,6 +82,15 @@ def derive(
     }
     violations = np.concatenate([lane.violations for lane in lanes])
     return Derived(figures, violations[np.argsort(violations[:, 0])], float(least[GAP]))
+
+
+def _least_margin(following_m: float, merges: dict[int, float]) -> tuple[float, float | None]:
+    """Returns the least margin (m) over Eq. 1, or that of 15 or 16 if it is broken and less."""
+    margin_m, equation = following_m, 1
+    for number, at_merge_m in merges.items():
+        if at_merge_m < min(0.0, margin_m):
+            margin_m, equation = at_merge_m, number
+    return margin_m, float(equation) if math.isfinite(margin_m) else None
 
 
 def _finite(value: float) -> float | None:

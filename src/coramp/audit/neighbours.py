@@ -13,8 +13,11 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.audit.orders import Motion, place_in, under_way
 from coramp.checker.distances import Bounds, following_distance_m, lane_change_distance_m
 
-MARGIN, TTC, DRAC, SEVERITY, GAP, VIOLATIONS = range(6)
-"""Places among the extremes of a lane: m, s, m/s2, m2/s4, m, and how many."""
+MARGIN, MERGE_FRONT, MERGE_REAR, TTC, DRAC, SEVERITY, GAP, VIOLATIONS = range(8)
+"""Places among the extremes of a lane: margins (m) over Eq. 1, 15 and 16, TTC (s), DRAC (m/s2),
+severity (m2/s4), gap (m), and how many violations."""
+ROUNDING_M = 1e-8
+"""By so much a margin may be below 0, for rounding."""
 COLLISION_S = 0.2
 """Eq. 8: a collision lasts 0.2 s, and both vehicles are as heavy."""
 
@@ -47,7 +50,8 @@ def extremes_in_lane(motion: Motion, length_m: FloatArray, stays: Stays, bounds:
     comes = np.repeat([0, 1], count)  # at one time, who leaves is gone before others come
     stay = np.tile(np.arange(count), 2)
     order = np.lexsort((stay, comes, times_s))
-    extremes = np.array([math.inf, math.inf, 0.0, 0.0, math.inf, 0.0])
+    extremes = np.zeros(8)
+    extremes[[MARGIN, MERGE_FRONT, MERGE_REAR, TTC, GAP]] = math.inf
     noted = np.empty((4 * count + 4, 4))
     _pass_through(
         motion, length_m, stays, times_s[order], comes[order], stay[order], bounds, extremes, noted
@@ -164,11 +168,12 @@ def _look_at_merge(
     own, theirs = stays.vehicle[stay], stays.vehicle[other]
     own_m, own_mps = _state(motion, own, now_s)
     other_m, other_mps = _state(motion, theirs, now_s)
-    front, rear, gap_m = theirs, own, other_m - length_m[theirs] - own_m
+    front, rear, gap_m, side = theirs, own, other_m - length_m[theirs] - own_m, MERGE_FRONT
     if other_m < own_m:
-        front, rear, gap_m = own, theirs, own_m - length_m[own] - other_m
+        front, rear, gap_m, side = own, theirs, own_m - length_m[own] - other_m, MERGE_REAR
     margin_m = gap_m - lane_change_distance_m(own_mps, other_mps, bounds)
-    if margin_m < 0.0:
+    extremes[side] = min(extremes[side], margin_m)
+    if margin_m < -ROUNDING_M:
         _note(extremes, noted, now_s, front, rear, margin_m)
     along_mps = own_mps * bounds.cos_merge_angle
     faster_mps, slower_mps = max(along_mps, other_mps), min(along_mps, other_mps)
@@ -218,7 +223,7 @@ def _look(
         while j + 1 < rear_end and rows[j + 1, 0] <= now_s:
             j += 1
     extremes[MARGIN] = min(extremes[MARGIN], least_m)
-    if least_m < 0.0:
+    if least_m < -ROUNDING_M:
         _note(extremes, noted, least_s, front, rear, least_m)
 
 

@@ -25,26 +25,12 @@ from coramp.checker.reasons import (
     TOO_FAST,
     TOO_HARD,
 )
-
-
-class Vehicles(NamedTuple):
-    """What is committed; row i drives ``pieces[first[i] : first[i] + piece_count[i]]``.
-
-    ``merge_s`` is minus infinity for mainline vehicles, infinity while no merge is committed.
-    """
-
-    pieces: FloatArray
-    first: IntArray
-    piece_count: IntArray
-    length_m: FloatArray
-    merge_s: FloatArray
-    live: IntArray
+from coramp.checker.record import LENGTH, LIVE, Record, forget_exited, way_of
 
 
 class Change(NamedTuple):
     """New trajectories: entry k is for row ``rows[k]``, and is ``pieces[k, :piece_count[k]]``.
 
-    ``start`` of shape (k, 3) is the time, station and speed at which each must take over.
     ``makes_gap`` is 1 for vehicles that move aside, which may be faster than v0 until then.
     """
 
@@ -52,12 +38,24 @@ class Change(NamedTuple):
     piece_count: IntArray
     pieces: FloatArray
     merge_s: FloatArray
-    start: FloatArray
     makes_gap: IntArray
 
 
+class Entry(NamedTuple):
+    """A vehicle's request to enter: when (s), where (m), how fast (m/s), how long (m), by where."""
+
+    time_s: float
+    station_m: float
+    speed_mps: float
+    length_m: float
+    on_ramp: bool
+
+
 class Verdict(NamedTuple):
-    """Outcome: a code of ``REASONS``, the row at fault, the other one, the least margin (m)."""
+    """Outcome: a code of ``REASONS``, the row at fault, the other one, the least margin (m).
+
+    Rows are -1 where there is none, as for a vehicle that has not entered.
+    """
 
     code: int
     row: int
@@ -66,36 +64,31 @@ class Verdict(NamedTuple):
 
 
 @kernel
-def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bounds) -> Verdict:
-    """Returns whether the change may be committed, and the least margin that it leaves.
+def examine(
+    record: Record, change: Change, now_s: float, earliest_s: float, bounds: Bounds
+) -> Verdict:
+    """Returns whether a change may be committed at ``now_s``, and the least margin that it leaves.
 
-    Checks every new trajectory by itself, then every pair of a changed vehicle and any other on
-    the road over all time. The margin is over Eq. 1, and over Eq. 15, 16 at lane changes; the
-    allowance is part of the test, not of the margin. A pair on the mainline whose envelopes show
-    that its margin is neither too small nor the least is not looked at piece by piece.
+    ``earliest_s`` is when a command of now takes effect. Checks every new trajectory by itself,
+    then every pair of a changed vehicle and any other on the road over all time. The margin is over
+    Eq. 1, and over Eq. 15, 16 at lane changes; the allowance is part of the test, not of the
+    margin. A pair on the mainline whose envelopes show that its margin is neither too small nor the
+    least is not looked at piece by piece.
     """
+    forget_exited(record, now_s)
     for k in range(len(change.rows)):
-        code = _examine_alone(vehicles, change, k, earliest_s, bounds)
+        code = _examine_command(record, change, k, earliest_s, bounds)
         if code != ACCEPTED:
             return Verdict(code, change.rows[k], -1, math.nan)
     least = math.inf
     for k in range(len(change.rows)):
-        row, mine = change.rows[k], _changed_way(vehicles, change, k)
-        from_s = mine.pieces[0, 0]
-        envelope = envelope_on_mainline(mine, bounds)
-        for other in vehicles.live[::-1]:  # who entered last is nearest to who enters
-            if other == row or _entry(change.rows, other) >= 0:
-                continue
-            theirs = _committed_way(vehicles, other)
-            if surely_apart(mine, envelope, theirs, from_s, least, bounds):
-                continue
-            code, margin = examine_pair(mine, theirs, from_s, bounds)
-            if code != ACCEPTED:
-                return Verdict(code, row, other, margin)
-            least = min(least, margin)
+        row, mine = change.rows[k], _changed_way(record, change, k)
+        code, other, least = _examine_against_others(record, change.rows, row, mine, least, bounds)
+        if code != ACCEPTED:
+            return Verdict(code, row, other, least)
         for k_other in range(k + 1, len(change.rows)):
-            theirs = _changed_way(vehicles, change, k_other)
-            code, margin = examine_pair(mine, theirs, from_s, bounds)
+            theirs = _changed_way(record, change, k_other)
+            code, margin = examine_pair(mine, theirs, mine.pieces[0, 0], bounds)
             if code != ACCEPTED:
                 return Verdict(code, row, change.rows[k_other], margin)
             least = min(least, margin)
@@ -103,16 +96,52 @@ def examine(vehicles: Vehicles, change: Change, earliest_s: float, bounds: Bound
 
 
 @kernel
-def _changed_way(vehicles: Vehicles, change: Change, k: int) -> Way:
-    pieces = change.pieces[k, : change.piece_count[k]]
-    return Way(pieces, vehicles.length_m[change.rows[k]], change.merge_s[k])
+def examine_entry(record: Record, entry: Entry, pieces: FloatArray, bounds: Bounds) -> Verdict:
+    """Returns whether a vehicle may enter on ``pieces``, and the least margin that it leaves."""
+    forget_exited(record, entry.time_s)
+    merge_s = math.inf if entry.on_ramp else -math.inf
+    code = _examine_form(pieces, merge_s)
+    if code == ACCEPTED:
+        code = _examine_start(pieces, entry.time_s, entry.time_s, entry.station_m, entry.speed_mps)
+    if code == ACCEPTED:
+        code = _examine_end(pieces, merge_s, bounds)
+    if code == ACCEPTED:
+        code = _examine_speeds(pieces, merge_s, pieces, False, -math.inf, bounds)
+    if code == ACCEPTED:
+        code = _examine_accelerations(pieces, merge_s, bounds)
+    if code != ACCEPTED:
+        return Verdict(code, -1, -1, math.nan)
+    mine = Way(pieces, entry.length_m, merge_s)
+    nobody = np.empty(0, np.int64)
+    code, other, least = _examine_against_others(record, nobody, -1, mine, math.inf, bounds)
+    return Verdict(code, -1, other, least)
 
 
 @kernel
-def _committed_way(vehicles: Vehicles, row: int) -> Way:
-    first = vehicles.first[row]
-    pieces = vehicles.pieces[first : first + vehicles.piece_count[row]]
-    return Way(pieces, vehicles.length_m[row], vehicles.merge_s[row])
+def _examine_against_others(
+    record: Record, changed: IntArray, row: int, mine: Way, least: float, bounds: Bounds
+) -> tuple[int, int, float]:
+    """Returns a reason, the other row, and the least margin (m) to everyone who is not changed."""
+    from_s = mine.pieces[0, 0]
+    envelope = envelope_on_mainline(mine, bounds)
+    for k in range(record.used[LIVE] - 1, -1, -1):  # who entered last is nearest to who enters
+        other = record.live[k]
+        if other == row or _entry(changed, other) >= 0:
+            continue
+        theirs = way_of(record, other)
+        if surely_apart(mine, envelope, theirs, from_s, least, bounds):
+            continue
+        code, margin = examine_pair(mine, theirs, from_s, bounds)
+        if code != ACCEPTED:
+            return code, other, margin
+        least = min(least, margin)
+    return ACCEPTED, -1, least
+
+
+@kernel
+def _changed_way(record: Record, change: Change, k: int) -> Way:
+    pieces = change.pieces[k, : change.piece_count[k]]
+    return Way(pieces, record.traits[change.rows[k], LENGTH], change.merge_s[k])
 
 
 @kernel
@@ -124,22 +153,25 @@ def _entry(rows: IntArray, row: int) -> int:
 
 
 @kernel
-def _examine_alone(
-    vehicles: Vehicles, change: Change, k: int, earliest_s: float, bounds: Bounds
+def _examine_command(
+    record: Record, change: Change, k: int, earliest_s: float, bounds: Bounds
 ) -> int:
+    """Returns the reason why one new trajectory may not be commanded, by itself."""
     pieces = change.pieces[k, : change.piece_count[k]]
     merge_s = change.merge_s[k]
+    before = way_of(record, change.rows[k])
     code = _examine_form(pieces, merge_s)
     if code == ACCEPTED:
-        code = _examine_start(pieces, change.start[k], earliest_s)
-    if code == ACCEPTED and _changes_the_past(
-        vehicles.merge_s[change.rows[k]], merge_s, pieces[0, 0]
-    ):
+        station_m, speed_mps, _ = state_at(before.pieces, pieces[0, 0])
+        code = _examine_start(pieces, earliest_s, pieces[0, 0], station_m, speed_mps)
+    if code == ACCEPTED and _changes_the_past(before.merge_s, merge_s, pieces[0, 0]):
         code = CHANGES_THE_PAST
     if code == ACCEPTED:
         code = _examine_end(pieces, merge_s, bounds)
     if code == ACCEPTED:
-        code = _examine_speeds(vehicles, change, k, bounds)
+        makes_gap = change.makes_gap[k] == 1
+        gap_made_s = _last_merge_s(change)
+        code = _examine_speeds(pieces, merge_s, before.pieces, makes_gap, gap_made_s, bounds)
     if code == ACCEPTED:
         code = _examine_accelerations(pieces, merge_s, bounds)
     return code
@@ -162,15 +194,20 @@ def _examine_form(pieces: FloatArray, merge_s: float) -> int:
 
 
 @kernel
-def _examine_start(pieces: FloatArray, start: FloatArray, earliest_s: float) -> int:
-    """A change replaces what was committed, so that it must say all that is driven from now on."""
+def _examine_start(
+    pieces: FloatArray, earliest_s: float, time_s: float, station_m: float, speed_mps: float
+) -> int:
+    """A command replaces what was committed, so that it must say all that is driven from now on.
+
+    It begins at the time, station and speed at which the vehicle then is.
+    """
     if pieces[0, 0] < earliest_s - JOIN:
         return STARTS_TOO_EARLY
     if pieces[0, 0] > earliest_s + JOIN:
         return STARTS_TOO_LATE
-    for column in range(3):
-        if abs(pieces[0, column] - start[column]) > JOIN:
-            return LEAVES_ITS_PATH
+    time_s_off = abs(pieces[0, 0] - time_s)
+    if max(time_s_off, abs(pieces[0, 1] - station_m), abs(pieces[0, 2] - speed_mps)) > JOIN:
+        return LEAVES_ITS_PATH
     return ACCEPTED
 
 
@@ -200,19 +237,24 @@ def _examine_end(pieces: FloatArray, merge_s: float, bounds: Bounds) -> int:
 
 
 @kernel
-def _examine_speeds(vehicles: Vehicles, change: Change, k: int, bounds: Bounds) -> int:
-    pieces = change.pieces[k, : change.piece_count[k]]
-    merge_s = change.merge_s[k]
+def _examine_speeds(
+    pieces: FloatArray,
+    merge_s: float,
+    before: FloatArray,
+    makes_gap: bool,
+    gap_made_s: float,
+    bounds: Bounds,
+) -> int:
+    """``before`` is what was commanded until now; the gap is made by ``gap_made_s``."""
     v0 = bounds.mainline_speed_mps
-    gap_made_s = _last_merge_s(change)
     entered_mps = pieces[0, 2]
     for i in range(len(pieces)):
         t, s, v, _ = pieces[i]
         if v < -EXACT:
             return BACKWARDS
         limit_mps = bounds.ramp_limit_mps if t < merge_s and s < -JOIN else v0
-        if change.makes_gap[k] == 1 and t >= merge_s:
-            before_mps = _committed_speed_mps(vehicles, change.rows[k], t)
+        if makes_gap and t >= merge_s:
+            _, before_mps, _ = state_at(before, t)
             limit_mps = max(limit_mps, before_mps)
             if t < gap_made_s:
                 limit_mps = max(limit_mps, v0 * bounds.gap_speed_factor)
@@ -230,13 +272,6 @@ def _last_merge_s(change: Change) -> float:
         if change.makes_gap[k] == 0 and change.merge_s[k] < math.inf:
             last_s = max(last_s, change.merge_s[k])
     return last_s
-
-
-@kernel
-def _committed_speed_mps(vehicles: Vehicles, row: int, time_s: float) -> float:
-    first = vehicles.first[row]
-    _, v, _ = state_at(vehicles.pieces[first : first + vehicles.piece_count[row]], time_s)
-    return v
 
 
 @kernel

@@ -6,8 +6,9 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from coramp.errors import CorampError
-from coramp.native_output import send_native_output_to_stderr
+from coramp.cli.completion import scenario_names, snapshot_names, strategy_names, study_names
+from coramp.cli.native_output import send_native_output_to_stderr
+from coramp.errors import CorampError, printable
 
 WRONG, USAGE, UNSAFE, STOPPED = 1, 2, 3, 130
 DEBUG = "--debug"
@@ -16,7 +17,6 @@ app = typer.Typer(
     name="coramp",
     help="Cooperative on-ramp merging: plan, simulate, compare and explain.",
     epilog="Example: coramp run paper --mainline 1500 --ramp 700 --seed 77 --out out/r",
-    add_completion=False,
     rich_markup_mode=None,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -24,12 +24,33 @@ app = typer.Typer(
 )
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
-StrategyName = Annotated[str, typer.Option("--strategy", "-s", help="See `coramp strategies`.")]
+StrategyName = Annotated[
+    str,
+    typer.Option(
+        "--strategy", "-s", help="See `coramp strategies`.", autocompletion=strategy_names
+    ),
+]
+ScenarioName = Annotated[
+    str,
+    typer.Argument(help="A built-in scenario or a TOML file.", autocompletion=scenario_names),
+]
+
+
+def _told_version(asked: bool) -> None:
+    if asked:
+        from importlib import metadata
+
+        print(f"coramp {metadata.version('coramp')}")
+        raise typer.Exit
 
 
 @app.callback()
 def _options(
     _debug: Annotated[bool, typer.Option(DEBUG, help="Show tracebacks of errors.")] = False,
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_told_version, help="Say the version."),
+    ] = False,
 ) -> None:
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
@@ -65,7 +86,7 @@ def strategies(json: Json = False) -> None:
 
     origins = {name: origin_of(name) for name in registered()}
     texts = {
-        name: s.summary if origins[name] == OURS else f"{s.summary} [{origins[name]}]"
+        name: s.summary if origins[name] == OURS else printable(f"{s.summary} [{origins[name]}]")
         for name, s in registered().items()
     }
     found = {"strategies": texts}
@@ -92,7 +113,10 @@ def new_strategy(
 
 @app.command(epilog="Example: coramp plan example --plot example.png")
 def plan(
-    snapshot: Annotated[str, typer.Argument(help="A built-in snapshot or a TOML file.")],
+    snapshot: Annotated[
+        str,
+        typer.Argument(help="A built-in snapshot or a TOML file.", autocompletion=snapshot_names),
+    ],
     strategy: StrategyName = "mainline-priority",
     json: Json = False,
     plot: Annotated[
@@ -119,7 +143,7 @@ def plan(
     epilog="Example: coramp run paper -s ramp-priority --mainline 1800 --ramp 500 --out out/r"
 )
 def run(
-    scenario: Annotated[str, typer.Argument(help="A built-in scenario or a TOML file.")],
+    scenario: ScenarioName,
     strategy: StrategyName = "mainline-priority",
     engine: Annotated[str, typer.Option(help="What moves the vehicles: sumo or exact.")] = "sumo",
     mainline: Annotated[float | None, typer.Option(help="Mainline flow in veh/h.")] = None,
@@ -146,7 +170,13 @@ def run(
 ) -> None:
     """Run one scenario."""
     from coramp.api import run as run_scenario
-    from coramp.cli.console import print_json, print_run, tell_of_compiling, tell_of_demand, working
+    from coramp.cli.console import (
+        print_json,
+        print_run,
+        tell_of_compiling,
+        tell_of_demand,
+        working,
+    )
     from coramp.scenarios.toml_files import parse_overrides
 
     if keep_messages and out is None:
@@ -178,7 +208,9 @@ def run(
 
 @app.command(epilog="Example: coramp study paper --seeds 10 --out out/p10")
 def study(
-    name: Annotated[str, typer.Argument(help="A built-in study or a TOML file.")],
+    name: Annotated[
+        str, typer.Argument(help="A built-in study or a TOML file.", autocompletion=study_names)
+    ],
     seeds: Annotated[int | None, typer.Option(help="Seeds 1 to N (default: the study's).")] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
     cluster: Annotated[
@@ -330,7 +362,7 @@ def replay(
 
 @app.command(epilog="Example: coramp studio my-ramp.toml --port 8650 --open")
 def studio(
-    scenario: Annotated[str, typer.Argument(help="A built-in scenario or a TOML file.")] = "paper",
+    scenario: ScenarioName = "paper",
     port: Annotated[int, typer.Option(help="Port on this machine; 0 takes any.")] = 8642,
     show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
@@ -428,5 +460,5 @@ def _report(error: Exception) -> int:
             text = f"unexpected {type(error).__name__}: {error}; add {DEBUG} to see where"
             code, messages = WRONG, (text,)
     for message in messages:
-        print(f"Error: {' '.join(str(message).split())}", file=sys.stderr)
+        print(f"Error: {printable(str(message))}", file=sys.stderr)
     return code

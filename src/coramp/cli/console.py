@@ -129,7 +129,7 @@ def run_table(summary: Row) -> Table:
             "collisions, safe-distance violations",
             f"{summary['collisions']}, {summary['safety_violations']}",
         ),
-        ("smallest margin over the safe distance (m)", number(summary["min_margin_m"], 3)),
+        ("smallest margin over the safe distance (m)", _margin(summary)),
         ("smallest TTC (s), largest DRAC (m/s2)", _two(summary, "min_ttc_s", "max_drac_mps2")),
         (
             "largest severity J (m2/s4), hardest braking (m/s2)",
@@ -172,6 +172,13 @@ def _bound_lines(summary: Row) -> list[tuple[str, str]]:
         ),
         ("most that the lane carries (veh/h)", number(summary["lane_limit_veh_h"], 0)),
     ]
+
+
+def _margin(summary: Row) -> str:
+    """The least margin, with its equation where that is not Eq. 1."""
+    equation = summary["min_margin_equation"]
+    over = f", over Eq. {equation}" if equation not in (None, 1) else ""
+    return f"{number(summary['min_margin_m'], 3)}{over}"
 
 
 def _two(summary: Row, first: str, second: str) -> str:

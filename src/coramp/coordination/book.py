@@ -22,6 +22,8 @@ from coramp.vehicles.fleet import Fleet, committed
 
 ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
 """Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
+LONG = 500_000
+"""From so many pieces on (16 MB) a book is made to forget what was never driven."""
 
 
 class Book(NamedTuple):
@@ -52,8 +54,8 @@ class Book(NamedTuple):
     used: IntArray
 
 
-def empty_book(rows: int, pieces: int) -> Book:
-    """Returns a book with room for so many rows and pieces."""
+def empty_book(rows: int, blocks: int, pieces: int) -> Book:
+    """Returns a book with room for so many rows, commitments and pieces."""
     return Book(
         np.empty((pieces, 4)),
         np.zeros(rows, np.int64),
@@ -67,24 +69,78 @@ def empty_book(rows: int, pieces: int) -> Book:
         np.zeros(rows, np.int64),
         np.zeros(rows, np.bool_),
         np.zeros(rows, np.int64),
-        np.zeros(2 * rows, np.int64),
-        np.zeros(2 * rows, np.int64),
-        np.zeros(2 * rows, np.int64),
+        np.zeros(blocks, np.int64),
+        np.zeros(blocks, np.int64),
+        np.zeros(blocks, np.int64),
         np.zeros(5, np.int64),
     )
 
 
 def with_room(book: Book, commitments: int = 1) -> Book:
-    """Returns the book, or one with more room where fewer commitments fit than that."""
-    rows, pieces = len(book.live), len(book.pieces)
-    while is_full(book.used, rows, 2 * rows, pieces, commitments):
-        rows, pieces = 2 * rows, 2 * pieces + MAX_PIECES
-    if rows == len(book.live):
+    """Returns the book, or one with more room where fewer commitments fit than that.
+
+    From ``LONG`` pieces on, what was committed and never driven is left out of the new one: of a
+    vehicle steered ten times a second that is nearly all.
+    """
+    rows, blocks, pieces = len(book.live), len(book.block_row), len(book.pieces)
+    if not is_full(book.used, rows, blocks, pieces, commitments):
         return book
-    larger = empty_book(rows, pieces)
-    for old, new in zip(book, larger, strict=True):
+    used = book.used.copy()
+    long = pieces >= LONG
+    if long:
+        used[PIECES] = driven_count(book)
+    rows = 2 * rows if used[ROWS] >= rows else rows
+    blocks = 2 * blocks + commitments if used[BLOCKS] + commitments > blocks else blocks
+    while 2 * used[PIECES] > pieces or is_full(used, rows, blocks, pieces, commitments):
+        pieces = 2 * pieces + MAX_PIECES
+    larger = empty_book(rows, blocks, pieces)
+    for old, new in zip(book[1:], larger[1:], strict=True):
         new[: len(old)] = old
+    if long:
+        _copy_driven(book, larger)
+    else:
+        larger.pieces[: len(book.pieces)] = book.pieces
     return larger
+
+
+@kernel
+def _kept_of_blocks(book: Book) -> IntArray:
+    """Returns how many pieces of each commitment count: those that begin before the next one."""
+    blocks = book.used[BLOCKS]
+    kept = book.block_count[:blocks].copy()
+    until_s = np.full(book.used[ROWS], math.inf)
+    for block in range(blocks - 1, -1, -1):
+        row, first = book.block_row[block], book.block_first[block]
+        while kept[block] > 1 and book.pieces[first + kept[block] - 1, TIME] >= until_s[row]:
+            kept[block] -= 1
+        until_s[row] = book.pieces[first, TIME]
+    return kept
+
+
+@kernel
+def driven_count(book: Book) -> int:
+    """Returns for how many pieces there must be room if what was never driven is left out."""
+    count = int(_kept_of_blocks(book).sum())
+    for row in range(book.used[ROWS]):
+        count += book.way_count[row] - book.piece_count[row]
+    return count
+
+
+@kernel
+def _copy_driven(book: Book, out: Book) -> None:
+    """Copies the pieces that count into ``out``, and says there where they lie."""
+    kept, n = _kept_of_blocks(book), 0
+    for block in range(book.used[BLOCKS]):
+        row, first = book.block_row[block], book.block_first[block]
+        start = first
+        if first == book.first_piece[row]:  # its last one, with what leads to it
+            start = book.way_first[row]
+            out.way_first[row], out.first_piece[row] = n, n + first - start
+        out.block_first[block], out.block_count[block] = n + first - start, kept[block]
+        end = first + kept[block]
+        out.pieces[n : n + end - start] = book.pieces[start:end]
+        n += end - start
+    out.used[PIECES] = n
 
 
 @kernel

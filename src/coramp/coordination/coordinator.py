@@ -107,7 +107,7 @@ class Coordinator:
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
-        self._examiner = Examiner(bounds_of(rules))
+        self._examiner = Examiner(bounds_of(rules), len(feed))
         self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
@@ -149,13 +149,19 @@ class Coordinator:
         self._gate = with_feed(self._gate, self._feed)
         while True:
             stop = admit_until(
-                self.ledger.book, self._gate, last_step, self._packed, self._examiner.bounds
+                self.ledger.book,
+                self._examiner.record,
+                self._gate,
+                last_step,
+                self._packed,
+                self._examiner.bounds,
             )
             last_step = min(last_step, self._announce_entries())
             if stop.why == DONE:
                 return
             if stop.why == FULL:
                 self.ledger.make_room()
+                self._examiner.make_room()
             elif stop.why == REFUSED:
                 self._note_refusal(stop.step, len(self.ledger), stop.code)
 
@@ -247,8 +253,10 @@ class Coordinator:
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts who asks to enter on the road, from that station; False where that is not safe."""
         self.ledger.make_room()
+        self._examiner.make_room()
         code = enter(
             self.ledger.book,
+            self._examiner.record,
             self._gate,
             number,
             station_m,
@@ -265,7 +273,9 @@ class Coordinator:
         self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
-        self.ledger.commit(row, pieces, merge_time_s, step * self._step_s)
+        now_s = step * self._step_s
+        self.ledger.commit(row, pieces, merge_time_s, now_s)
+        self._examiner.note(row, pieces, merge_time_s, now_s)
         if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
             self._due_step.pop(row, None)
         self._announce(row, step)
@@ -298,7 +308,7 @@ class Coordinator:
         ]
         if not moves or not (self._asks_at_entry or row in [move.row for move in moves]):
             return False
-        verdict = self._examiner.change(self.ledger, moves, from_s)
+        verdict = self._examiner.change(moves, time_s, from_s)
         if verdict.code != ACCEPTED:
             self._note_refusal(step, row, verdict.code)
             return False
@@ -339,7 +349,7 @@ class Coordinator:
         margin_m = math.nan
         if trajectories:
             earliest_s = time_s + self._rules.control.actuation_delay_s
-            verdict = self._examiner.change(self.ledger, trajectories, earliest_s)
+            verdict = self._examiner.change(trajectories, time_s, earliest_s)
             code = verdict.code
             if (
                 code == ACCEPTED
@@ -373,7 +383,7 @@ class Coordinator:
             step * self._step_s,
             self._fastest_entry_mps,
             self._packed,
-            self._examiner.bounds,
+            self._examiner,
         )
         for command, driven in zip(commands, carried_out, strict=True):
             if driven:

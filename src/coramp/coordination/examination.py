@@ -4,16 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coramp._kernel import kernel
+from coramp._kernel import FloatArray, kernel
 from coramp.checker.checker import Change, Verdict, examine
 from coramp.checker.distances import Bounds
-from coramp.coordination.book import Book, fleet_of
-from coramp.coordination.gate import vehicles_of
-from coramp.coordination.ledger import Ledger
-from coramp.kinematics.trajectory import MAX_PIECES, TIME, station_and_speed
+from coramp.checker.record import Record, empty_record, note_command, with_room
+from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
-from coramp.vehicles.fleet import MAX_CHANGED, committed
+from coramp.vehicles.fleet import MAX_CHANGED
 
 
 def bounds_of(rules: Rules) -> Bounds:
@@ -39,28 +37,36 @@ def bounds_of(rules: Rules) -> Bounds:
 
 
 class Examiner:
-    """Holds the buffers in which changes are laid before the checker."""
+    """Lays changes before the checker, and tells it what was commanded.
 
-    def __init__(self, bounds: Bounds) -> None:
+    ``record`` is the checker's own; kernels that let vehicles in write into it. It is replaced as
+    it grows.
+    """
+
+    def __init__(self, bounds: Bounds, vehicles: int = 0) -> None:
         self.bounds = bounds
-        self._make_room(MAX_CHANGED)
+        self.record: Record = empty_record(max(16, vehicles), 8 * max(16, vehicles))
+        self._room_for(MAX_CHANGED)
 
-    def _make_room(self, changes: int) -> None:
+    def make_room(self, commands: int = 1) -> None:
+        """Makes sure that the record has room for one more row and so many commands."""
+        self.record = with_room(self.record, commands, MAX_PIECES)
+
+    def _room_for(self, changes: int) -> None:
         self._change = Change(
             np.zeros(changes, np.int64),
             np.zeros(changes, np.int64),
             np.zeros((changes, MAX_PIECES, 4)),
             np.zeros(changes),
-            np.zeros((changes, 3)),
             np.zeros(changes, np.int64),
         )
 
     def change(
-        self, ledger: Ledger, commands: Sequence[FollowTrajectory], earliest_s: float
+        self, commands: Sequence[FollowTrajectory], now_s: float, earliest_s: float
     ) -> Verdict:
         """Returns the verdict on trajectories that take over from what is committed."""
         if len(commands) > len(self._change.rows):
-            self._make_room(2 * len(commands))
+            self._room_for(2 * len(commands))
         change = self._change
         for k, command in enumerate(commands):
             count = len(command.pieces)
@@ -69,28 +75,24 @@ class Examiner:
             change.pieces[k, :count] = command.pieces
             change.merge_s[k] = command.merge_time_s
             change.makes_gap[k] = command.makes_gap
-        return examine_change(ledger.book, change, len(commands), earliest_s, self.bounds)
+        return examine_first(self.record, change, len(commands), now_s, earliest_s, self.bounds)
+
+    def note(self, row: int, pieces: FloatArray, merge_s: float, now_s: float) -> None:
+        """Tells the checker of a command that was sent."""
+        self.make_room()
+        note_command(self.record, row, merge_s, pieces, now_s, self.bounds.zone_end_m)
 
 
 @kernel
-def examine_change(
-    book: Book, change: Change, count: int, earliest_s: float, bounds: Bounds
+def examine_first(
+    record: Record, change: Change, count: int, now_s: float, earliest_s: float, bounds: Bounds
 ) -> Verdict:
-    """Returns the checker's verdict on the first ``count`` entries of a change of the book.
-
-    Fills in where each must take over: what is committed for its first time.
-    """
-    fleet = fleet_of(book)
-    for k in range(count):
-        start_s = change.pieces[k, 0, TIME]
-        station_m, speed_mps = station_and_speed(committed(fleet, change.rows[k]), start_s)
-        change.start[k, 0], change.start[k, 1], change.start[k, 2] = start_s, station_m, speed_mps
+    """Returns the checker's verdict on the first ``count`` entries of a change."""
     in_use = Change(
         change.rows[:count],
         change.piece_count[:count],
         change.pieces[:count],
         change.merge_s[:count],
-        change.start[:count],
         change.makes_gap[:count],
     )
-    return examine(vehicles_of(book), in_use, earliest_s, bounds)
+    return examine(record, in_use, now_s, earliest_s, bounds)

@@ -8,12 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.checker.checker import Change, Vehicles, examine
+from coramp.checker.checker import Entry, examine_entry
 from coramp.checker.distances import Bounds
-from coramp.checker.reasons import ACCEPTED
+from coramp.checker.reasons import ACCEPTED, TOO_NEAR, TOO_NEAR_AT_MERGE
+from coramp.checker.record import Record, has_room, note_entry
 from coramp.coordination.admission import decision_due_s, plan_entry
-from coramp.coordination.book import LIVE, ROWS, Book, add_row, is_full, strike_exited, ways_of
+from coramp.coordination.book import (
+    BLOCKS,
+    LIVE,
+    ROWS,
+    Book,
+    add_row,
+    is_full,
+    strike_exited,
+    ways_of,
+)
 from coramp.coordination.book import write_commitment as write
+from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
@@ -24,6 +35,8 @@ HEARD, OFFERED, OPEN = range(3)
 """Places in ``Gate.feed``."""
 DONE, FULL, REFUSED = range(3)
 """Why ``admit_until`` came back: nobody else is due, the book is full, the checker refused."""
+ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
+"""Columns of ``Gate.refused``."""
 
 
 class Gate(NamedTuple):
@@ -36,7 +49,9 @@ class Gate(NamedTuple):
     request, the step at which it entered, the one at which it is planned. ``asks`` is True where
     the strategy is asked about each vehicle as it enters. A mainline vehicle waits outside rather
     than brake below ``slowest_mps`` as it enters. Both have one entry. ``feed`` is how many
-    requests have been heard, how many the feed has, and whether the gate is open.
+    requests have been heard, how many the feed has, and whether the gate is open. ``refused[s]`` is
+    whom of a stream the checker refused last and why, and how many commitments and vehicles on the
+    road there were then.
     """
 
     step: IntArray
@@ -53,6 +68,7 @@ class Gate(NamedTuple):
     asks: BoolArray
     slowest_mps: FloatArray
     feed: IntArray
+    refused: IntArray
 
 
 class Stop(NamedTuple):
@@ -79,6 +95,7 @@ def gate_for(feed: RequestFeed, asks: bool = False, slowest_mps: float = 0.0) ->
         np.array([asks]),
         np.array([slowest_mps]),
         np.array([0, len(feed), 0], np.int64),
+        np.full((2, 4), -1),
     )
 
 
@@ -180,12 +197,18 @@ def _next_tries(gate: Gate, stream: int, step: int) -> None:
 
 @kernel
 def admit_until(
-    book: Book, gate: Gate, last_step: int, packed_rules: FloatArray, bounds: Bounds
+    book: Book,
+    record: Record,
+    gate: Gate,
+    last_step: int,
+    packed_rules: FloatArray,
+    bounds: Bounds,
 ) -> Stop:
     """Lets in whoever is due, up to ``last_step`` or the step at which one of them is planned.
 
-    Whoever cannot enter safely tries again at the next step, and holds up those behind. Whoever has
-    left the zone by then is off the live list.
+    Whoever cannot enter safely tries again at the next step, and holds up those behind. Whom the
+    checker refuses for its own plan's sake tries again once others have planned, come or gone; a
+    refusal is told once. Whoever has left the zone by then is off the live list.
     """
     rules = unpacked(packed_rules)
     while True:
@@ -196,11 +219,16 @@ def admit_until(
         _hear(gate, step)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if is_full(book.used, len(book.live), len(book.block_row), len(book.pieces)):
+                if is_full(
+                    book.used, len(book.live), len(book.block_row), len(book.pieces)
+                ) or not has_room(record, MAX_PIECES):
                     return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
+                if _is_as_refused(book, gate, stream, arrival):
+                    gate.try_step[stream] = step + 1
+                    continue
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
-                code = enter(book, gate, arrival, start_m, step, rules, bounds)
+                code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
                 if code == ACCEPTED:
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
@@ -209,13 +237,36 @@ def admit_until(
                         last_step = min(last_step, step)
                 else:
                     gate.try_step[stream] = step + 1
-                    if code != WAITS:
+                    if code != WAITS and _is_news(book, gate, stream, arrival, code):
                         return Stop(REFUSED, step, arrival, code)
+
+
+@kernel
+def _is_as_refused(book: Book, gate: Gate, stream: int, arrival: int) -> bool:
+    """Returns whether nothing has changed since an arrival was refused for its own plan's sake."""
+    last = gate.refused[stream]
+    return bool(
+        last[ARRIVAL] == arrival
+        and last[CODE] not in (TOO_NEAR, TOO_NEAR_AT_MERGE)
+        and last[COMMITMENTS] == book.used[BLOCKS]
+        and last[ON_ROAD] == book.used[LIVE]
+    )
+
+
+@kernel
+def _is_news(book: Book, gate: Gate, stream: int, arrival: int, code: int) -> bool:
+    """Notes a refusal; returns whether the arrival has not been refused for that just before."""
+    last = gate.refused[stream]
+    news = last[ARRIVAL] != arrival or last[CODE] != code
+    last[ARRIVAL], last[CODE] = arrival, code
+    last[COMMITMENTS], last[ON_ROAD] = book.used[BLOCKS], book.used[LIVE]
+    return bool(news)
 
 
 @kernel
 def enter(
     book: Book,
+    record: Record,
     gate: Gate,
     arrival: int,
     station_m: float,
@@ -241,13 +292,12 @@ def enter(
     )
     if len(pieces) == 0:
         return WAITS
-    row = add_row(book, length_m, on_ramp)
-    start = np.array([[time_s, station_m, speed_mps]])
-    code = examine_entry(book, row, pieces, start, bounds)
+    entry = Entry(time_s, station_m, speed_mps, length_m, on_ramp)
+    code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
-        book.used[ROWS] -= 1
         return code
-    road = rules.road
+    row, road = add_row(book, length_m, on_ramp), rules.road
+    note_entry(record, length_m, book.merge_time_s[row], pieces, bounds.zone_end_m)
     merge_s = book.merge_time_s[row]
     write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
     gate.row_arrival[row], gate.row_step[row] = arrival, step
@@ -261,43 +311,3 @@ def enter(
 def first_step_from(time_s: float, step_s: float) -> int:
     """Returns the first step at or after a time."""
     return int(np.ceil(time_s / step_s - 1e-6))
-
-
-@kernel
-def examine_entry(
-    book: Book, row: int, pieces: FloatArray, start: FloatArray, bounds: Bounds
-) -> int:
-    """Returns the checker's code for a vehicle that enters; start: time, station, speed."""
-    change = Change(
-        np.array([row]),
-        np.array([len(pieces)]),
-        pieces.reshape((1, len(pieces), 4)),
-        np.array([book.merge_time_s[row]]),
-        start,
-        np.zeros(1, np.int64),
-    )
-    return examine(_from_now_on(book), change, start[0, 0], bounds).code
-
-
-@kernel
-def vehicles_of(book: Book) -> Vehicles:
-    """Returns what is committed, as the checker reads it, from when the last command acts."""
-    return _as_vehicles(book, book.first_piece, book.piece_count)
-
-
-@kernel
-def _from_now_on(book: Book) -> Vehicles:
-    """Returns what everyone drives from now on, which matters to whoever enters now."""
-    return _as_vehicles(book, book.way_first, book.way_count)
-
-
-@kernel
-def _as_vehicles(book: Book, first: IntArray, count: IntArray) -> Vehicles:
-    return Vehicles(
-        book.pieces,
-        first,
-        count,
-        book.length_m,
-        book.merge_time_s,
-        book.live[: book.used[LIVE]],
-    )

@@ -6,7 +6,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from coramp.coordination.time_limit import TooLong, time_limit
-from coramp.errors import CorampError
+from coramp.errors import CorampError, printable
 from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.strategies.base import (
     Decider,
@@ -100,7 +100,7 @@ def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Dec
 
 
 def _told(error: BaseException) -> str:
-    text = " ".join(str(error).split())
+    text = printable(str(error))
     return f"raises {type(error).__name__}: {text}" if text else f"raises {type(error).__name__}"
 
 

@@ -11,7 +11,6 @@ from coramp.coordination.book import (
     LIVE,
     ROWS,
     Book,
-    add_row,
     empty_book,
     states_of_live,
     with_room,
@@ -33,7 +32,8 @@ class Ledger:
     """Holds all commitments of a run. ``book`` is for kernels; it is replaced as it grows."""
 
     def __init__(self, cruise_speed_mps: float, zone_end_m: float, vehicles: int = 0) -> None:
-        self.book: Book = empty_book(max(16, vehicles), 8 * max(16, vehicles))
+        rows = max(16, vehicles)
+        self.book: Book = empty_book(rows, 2 * rows, 8 * rows)
         self._cruise_speed_mps = cruise_speed_mps
         self._zone_end_m = zone_end_m
 
@@ -48,7 +48,10 @@ class Ledger:
 
     @property
     def history(self) -> Iterator[Commitment]:
-        """All commitments ever made, in their order."""
+        """All commitments ever made, in their order.
+
+        Of those that another one replaced a very long run keeps only what was driven.
+        """
         book = self.book
         for block in range(book.used[BLOCKS]):
             first = book.block_first[block]
@@ -58,17 +61,6 @@ class Ledger:
     def make_room(self, commitments: int = 1) -> None:
         """Makes sure that one more row and so many commitments fit into the book."""
         self.book = with_room(self.book, commitments)
-
-    def add(self, length_m: float, on_ramp: bool) -> int:
-        """Makes room for a cooperative vehicle that is about to enter; returns its row."""
-        self.make_room()
-        return int(add_row(self.book, length_m, on_ramp))
-
-    def withdraw(self, row: int) -> None:
-        """Takes back the last ``add`` of a vehicle that could not enter."""
-        if row != len(self) - 1 or self.book.piece_count[row]:
-            raise ValueError("only the newest row without a commitment can be withdrawn")
-        self.book.used[ROWS] -= 1
 
     def commit(self, row: int, pieces: FloatArray, merge_time_s: float, now_s: float) -> None:
         """Records at ``now_s`` that ``row`` follows ``pieces`` from their first time on."""

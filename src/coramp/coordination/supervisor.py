@@ -15,12 +15,13 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Change, examine
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED
+from coramp.checker.record import Record, note_command
 from coramp.coordination.book import Book, fleet_of
 from coramp.coordination.book import write_commitment as write
-from coramp.coordination.gate import vehicles_of
+from coramp.coordination.examination import Examiner
 from coramp.coordination.ledger import Ledger
 from coramp.equations.safe_distance import merge_clearance_m, standing_clearance_m
-from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m, station_and_speed
+from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m
 from coramp.motion.approach import stop_of_m
 from coramp.motion.driving import hold_then_cruise, hold_then_merge, hold_then_stop
 from coramp.road.rules import Rules, unpacked
@@ -39,15 +40,24 @@ def drive_safely(
     now_s: float,
     fastest_entry_mps: float,
     packed_rules: FloatArray,
-    bounds: Bounds,
+    examiner: Examiner,
 ) -> list[bool]:
     """Commits what is safe of the commands; returns for each whether it was carried out."""
     rows = np.array([command.row for command in commands], np.int64)
     wishes = np.array([(c.accel_mps2, c.hold_s) for c in commands])
     merges = np.array([command.merge for command in commands], np.bool_)
     ledger.make_room(len(rows))
+    examiner.make_room(len(rows))
     done: BoolArray = drive_all(
-        ledger.book, rows, wishes, merges, now_s, fastest_entry_mps, packed_rules, bounds
+        ledger.book,
+        examiner.record,
+        rows,
+        wishes,
+        merges,
+        now_s,
+        fastest_entry_mps,
+        packed_rules,
+        examiner.bounds,
     )
     return done.tolist()  # type: ignore[no-any-return]
 
@@ -55,6 +65,7 @@ def drive_safely(
 @kernel
 def drive_all(
     book: Book,
+    record: Record,
     rows: IntArray,
     wishes: FloatArray,
     merges: BoolArray,
@@ -70,10 +81,13 @@ def drive_all(
     for _ in range(MOST_PASSES):
         progress = False
         for k in range(len(rows)):
-            if not done[k] and _drive_one(
-                book, rows[k], wishes[k, 0], wishes[k, 1], merges[k], now_s, known_m, rules, bounds
-            ):
-                done[k] = progress = True
+            if done[k]:
+                continue
+            accel_mps2, hold_s = wishes[k]
+            done[k] = _drive_one(
+                book, record, rows[k], accel_mps2, hold_s, merges[k], now_s, known_m, rules, bounds
+            )
+            progress = progress or done[k]
         if not progress:
             break
     return done
@@ -82,6 +96,7 @@ def drive_all(
 @kernel
 def _drive_one(
     book: Book,
+    record: Record,
     row: int,
     accel_mps2: float,
     hold_s: float,
@@ -97,18 +112,18 @@ def _drive_one(
     merge_s = fleet.merge_time_s[row]
     if merge_s <= from_s:
         n = hold_then_cruise(fleet, row, accel_mps2, hold_s, from_s, rules, out)
-        return _commit_if_safe(book, row, out[:n], merge_s, now_s, rules, bounds)
+        return _commit_if_safe(book, record, row, out[:n], merge_s, now_s, rules, bounds)
     if merge or merge_s < math.inf:
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
             change_s = _lane_change_s(out[:n], rules)
-            if _commit_if_safe(book, row, out[:n], change_s, now_s, rules, bounds):
+            if _commit_if_safe(book, record, row, out[:n], change_s, now_s, rules, bounds):
                 return True
     if merge_s < math.inf:
         return False
     stop_m = _place_to_stop_m(fleet, row, from_s, rules)
     n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
-    return _commit_if_safe(book, row, out[:n], math.inf, now_s, rules, bounds)
+    return _commit_if_safe(book, record, row, out[:n], math.inf, now_s, rules, bounds)
 
 
 @kernel
@@ -145,6 +160,7 @@ def _place_to_stop_m(fleet: Fleet, row: int, from_s: float, rules: Rules) -> flo
 @kernel
 def _commit_if_safe(
     book: Book,
+    record: Record,
     row: int,
     pieces: FloatArray,
     merge_s: float,
@@ -155,16 +171,15 @@ def _commit_if_safe(
     if len(pieces) == 0:
         return False
     from_s, road = now_s + rules.control.actuation_delay_s, rules.road
-    station_m, speed_mps = station_and_speed(committed(fleet_of(book), row), from_s)
     change = Change(
         np.array([row]),
         np.array([len(pieces)]),
         pieces.reshape((1, len(pieces), 4)),
         np.array([merge_s]),
-        np.array([[from_s, station_m, speed_mps]]),
         np.zeros(1, np.int64),
     )
-    if examine(vehicles_of(book), change, from_s, bounds).code != ACCEPTED:
+    if examine(record, change, now_s, from_s, bounds).code != ACCEPTED:
         return False
+    note_command(record, row, merge_s, pieces, now_s, bounds.zone_end_m)
     write(book, row, pieces, merge_s, now_s, road.mainline_speed_mps, road.mainline_end_m)
     return True

@@ -13,15 +13,21 @@ from coramp.records.outcome import Outcome
 def lane_uses(outcome: Outcome) -> tuple[LaneUse, LaneUse]:
     """Returns who used the mainline, and who the ramp with its acceleration lane.
 
-    Cooperative vehicles change lanes once, as planned; SUMO's drivers are where they were seen:
-    when the mainline stands, some of them overtake on the acceleration lane.
+    Cooperative vehicles change lanes once, as planned. SUMO's drivers are where they were seen:
+    when the mainline stands, some of them overtake on the acceleration lane. So are cooperative
+    vehicles that SUMO did not carry as planned.
     """
     passages, driven = outcome.passages, outcome.driven
     until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
     until_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
     road = driven.first, driven.rows, passages.length_m
-    if not outcome.cooperative:
-        vehicle, on_mainline, from_s, to_s, again = _stays(outcome, until_s)
+    lane = outcome.driven_lane
+    if lane is not None:
+        until_s = _last_seen_s(outcome)
+    elif not outcome.cooperative:
+        lane = outcome.lane
+    if lane is not None:
+        vehicle, on_mainline, from_s, to_s, again = _stays(outcome, lane, until_s)
         mainline, ramp = (
             LaneUse(vehicle[here], *road, from_s[here], to_s[here], again[here] & on_mainline[here])
             for here in (on_mainline, ~on_mainline)
@@ -37,13 +43,22 @@ def lane_uses(outcome: Outcome) -> tuple[LaneUse, LaneUse]:
     )
 
 
+def _last_seen_s(outcome: Outcome) -> FloatArray:
+    """When each vehicle was seen last (s), minus infinity for one that never was."""
+    first, times_s = outcome.driven.first, outcome.driven.rows[:, 0]
+    last_s = np.full(len(first) - 1, -math.inf)
+    seen = first[1:] > first[:-1]
+    last_s[seen] = times_s[first[1:][seen] - 1]
+    return last_s
+
+
 def _stays(
-    outcome: Outcome, until_s: FloatArray
+    outcome: Outcome, lane: IntArray, until_s: FloatArray
 ) -> tuple[IntArray, BoolArray, FloatArray, FloatArray, BoolArray]:
     """Stretches in one lane: vehicle, whether on the mainline, from when to when (s), not first."""
     first, times_s = outcome.driven.first, outcome.driven.rows[:, 0]
     vehicle_of = np.repeat(np.arange(len(first) - 1), np.diff(first))
-    on_mainline = outcome.lane == MAINLINE
+    on_mainline = lane == MAINLINE
     same_vehicle = vehicle_of[1:] == vehicle_of[:-1]
     begins = np.append(True, ~same_vehicle | (on_mainline[1:] != on_mainline[:-1]))
     starts = np.flatnonzero(begins[: len(times_s)])

@@ -13,23 +13,21 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.equations.conflict_risk import conflict_severity_m2ps4
-from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
-from coramp.kinematics.trajectory import (
-    ACCEL,
-    SPEED,
-    STATION,
+from coramp.metrics.margins import (
     TIME,
-    piece_at,
-    piece_end_s,
-    station_and_speed,
+    least_margin_m,
+    margin_at_lane_change_m,
+    piece_under_way,
+    state_in_piece,
 )
 from coramp.road.rules import SafetyBudget
-from coramp.vehicles.separation import smallest_margin_m
 
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""
-MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS = range(5)
-FIGURES, NOTED = 5, 4
+MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS, MERGE_FRONT, MERGE_REAR = range(7)
+EXACT_M = 1e-8
+"""What rounding may take from a distance that the checker has measured to 1e-9 m."""
+FIGURES, NOTED = 7, 4
 """How many figures there are, and how many numbers tell of one violation."""
 
 
@@ -55,12 +53,14 @@ def lane_extremes(
 ) -> FloatArray:
     """Returns min margin (m), min TTC (s), max DRAC (m/s2), max severity (m2/s4), violations.
 
-    The margin is over Eq. 1. A violation is a pair of neighbours that come nearer than that, or at
-    a lane change nearer than Eq. 15 or 16. The first ``room`` of them follow, four numbers each:
+    The margin is over Eq. 1. Then come the least margins (m) at lane changes: over Eq. 15, to the
+    vehicle in front, and over Eq. 16, to the one behind. A violation is a pair of neighbours that
+    come nearer than one of these. The first ``room`` of them follow, four numbers each:
     time (s) of the least margin, front vehicle, rear vehicle, margin (m).
     """
     extremes = np.zeros(FIGURES + NOTED * room)
     extremes[MARGIN] = extremes[TTC] = math.inf
+    extremes[MERGE_FRONT] = extremes[MERGE_REAR] = math.inf
     times_s, kinds, vehicles = lane_events(lane)
     order = np.empty(len(lane.from_s), np.int64)
     since_s = np.empty(len(lane.from_s))
@@ -137,9 +137,9 @@ def _place_of(
         while order[place] != vehicle:
             place += 1
         return place
-    own_m, _ = station_and_speed(driven(lane, vehicle), now_s)
+    own_m, _ = _state_at(driven(lane, vehicle), now_s)
     while place < count:
-        other_m, _ = station_and_speed(driven(lane, order[place]), now_s)
+        other_m, _ = _state_at(driven(lane, order[place]), now_s)
         if other_m < own_m:
             break
         place += 1
@@ -157,9 +157,9 @@ def _end_pair(
     safety: SafetyBudget,
 ) -> None:
     ahead, behind, length_m = driven(lane, front), driven(lane, rear), _length_m(lane, front)
-    margin_m, least_s = smallest_margin_m(ahead, length_m, behind, start_s, end_s, safety)
+    margin_m, least_s = least_margin_m(ahead, length_m, behind, start_s, end_s, safety)
     extremes[MARGIN] = min(extremes[MARGIN], margin_m)
-    if margin_m < 0.0:
+    if margin_m < -EXACT_M:
         _note_violation(extremes, least_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
     ttc_s, drac_mps2 = closing_extremes(ahead, length_m, behind, start_s, end_s)
     extremes[TTC] = min(extremes[TTC], ttc_s)
@@ -187,17 +187,18 @@ def _look_at_merge(
     merge_angle_rad: float,
     safety: SafetyBudget,
 ) -> None:
-    own_m, own_mps = station_and_speed(driven(lane, merging), now_s)
-    other_m, other_mps = station_and_speed(driven(lane, other), now_s)
-    front, rear = other, merging
+    own_m, own_mps = _state_at(driven(lane, merging), now_s)
+    other_m, other_mps = _state_at(driven(lane, other), now_s)
+    front, rear, equation = other, merging, MERGE_FRONT
     distance_m = other_m - _length_m(lane, other) - own_m
     if other_m < own_m:
-        front, rear = merging, other
+        front, rear, equation = merging, other, MERGE_REAR
         distance_m = own_m - _length_m(lane, merging) - other_m
-    along_mps = merging_speed_along_mps(own_mps, merge_angle_rad)
-    margin_m = distance_m - merge_distance_m(along_mps, other_mps, safety)
-    if margin_m < 0.0:
+    margin_m = margin_at_lane_change_m(distance_m, own_mps, other_mps, merge_angle_rad, safety)
+    extremes[equation] = min(extremes[equation], margin_m)
+    if margin_m < -EXACT_M:
         _note_violation(extremes, now_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
+    along_mps = own_mps * math.cos(merge_angle_rad)
     severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)
 
@@ -212,15 +213,15 @@ def closing_extremes(
     infinity and 0 if it never is.
     """
     ttc_s, drac_mps2 = math.inf, 0.0
-    i, j = piece_at(front, start_s), piece_at(rear, start_s)
+    i, j = piece_under_way(front, start_s), piece_under_way(rear, start_s)
     now_s = start_s
     while now_s < end_s:
-        next_s = min(end_s, piece_end_s(front, i), piece_end_s(rear, j))
-        front_m, front_mps = _state_in(front, i, now_s)
-        rear_m, rear_mps = _state_in(rear, j, now_s)
+        next_s = min(end_s, _end_s(front, i), _end_s(rear, j))
+        front_m, front_mps, front_mps2 = state_in_piece(front, i, now_s)
+        rear_m, rear_mps, rear_mps2 = state_in_piece(rear, j, now_s)
         gap_m = front_m - front_length_m - rear_m
         opening_mps = front_mps - rear_mps
-        opening_mps2 = front[i, ACCEL] - rear[j, ACCEL]
+        opening_mps2 = front_mps2 - rear_mps2
         for x in _candidates(gap_m, opening_mps, opening_mps2, next_s - now_s):
             closing_mps = -(opening_mps + opening_mps2 * x)
             gap_then_m = gap_m + (opening_mps + 0.5 * opening_mps2 * x) * x
@@ -228,20 +229,22 @@ def closing_extremes(
                 ttc_s = min(ttc_s, gap_then_m / closing_mps)
                 drac_mps2 = max(drac_mps2, 0.5 * closing_mps * closing_mps / gap_then_m)
         now_s = next_s
-        if piece_end_s(front, i) <= now_s:
+        if _end_s(front, i) <= now_s:
             i += 1
-        if piece_end_s(rear, j) <= now_s:
+        if _end_s(rear, j) <= now_s:
             j += 1
     return ttc_s, drac_mps2
 
 
 @kernel
-def _state_in(pieces: FloatArray, k: int, time_s: float) -> tuple[float, float]:
-    x = time_s - pieces[k, TIME]
-    return (
-        pieces[k, STATION] + (pieces[k, SPEED] + 0.5 * pieces[k, ACCEL] * x) * x,
-        pieces[k, SPEED] + pieces[k, ACCEL] * x,
-    )
+def _state_at(pieces: FloatArray, time_s: float) -> tuple[float, float]:
+    station_m, speed_mps, _ = state_in_piece(pieces, piece_under_way(pieces, time_s), time_s)
+    return station_m, speed_mps
+
+
+@kernel
+def _end_s(pieces: FloatArray, k: int) -> float:
+    return float(pieces[k + 1, TIME]) if k + 1 < len(pieces) else math.inf
 
 
 @kernel

@@ -28,6 +28,8 @@ from coramp.metrics.separations import (
     DRAC,
     FIGURES,
     MARGIN,
+    MERGE_FRONT,
+    MERGE_REAR,
     NOTED,
     SEVERITY,
     TTC,
@@ -310,17 +312,36 @@ def _stream_metrics(streams: list[Row]) -> Row:
 def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     """Returns how near vehicles came and how hard they braked; null where no two met."""
     mainline, ramp = _extremes_of_lanes(outcome, scenario)
+    margin_m, equation = _least_margin(mainline, ramp)
     return {
         "collisions": outcome.collisions,
         "safety_violations": int(mainline[COUNT] + ramp[COUNT]),
-        "min_margin_m": _finite(min(mainline[MARGIN], ramp[MARGIN])),
+        "min_margin_m": _finite(margin_m),
         "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
         "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
         "max_severity": float(mainline[SEVERITY]),
         "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
         "max_jerk_mps3": _largest_jerk_mps3(outcome),
         "plan_error_m": _largest(outcome.passages.plan_error_m),
+        "min_margin_equation": equation,
+        "min_merge_margin_m": _finite(min(mainline[MERGE_FRONT], mainline[MERGE_REAR])),
     }
+
+
+def _least_margin(mainline: FloatArray, ramp: FloatArray) -> tuple[float, int | None]:
+    """Returns the least margin (m) over Eq. 1, or over 15 or 16 where one of these is broken.
+
+    With it comes the number of the equation, None where no two vehicles met.
+    """
+    by_equation = {
+        1: min(mainline[MARGIN], ramp[MARGIN]),
+        15: min(mainline[MERGE_FRONT], 0.0),
+        16: min(mainline[MERGE_REAR], 0.0),
+    }
+    broken = {number: margin for number, margin in by_equation.items() if margin < 0.0}
+    candidates = broken or {1: by_equation[1]}
+    equation = min(candidates, key=lambda number: float(candidates[number]))
+    return float(candidates[equation]), equation if math.isfinite(candidates[equation]) else None
 
 
 def _largest_jerk_mps3(outcome: Outcome) -> float:

@@ -95,7 +95,10 @@ def hold_then_merge(
     road, motion = rules.road, rules.motion
     before = committed(fleet, row)
     station_m, _ = station_and_speed(before, from_s)
-    limit_mps = road.ramp_limit_mps if station_m < 0.0 else road.mainline_speed_mps
+    limit_mps = road.ramp_limit_mps
+    if station_m >= 0.0:
+        limit_mps = road.mainline_speed_mps
+        accel_mps2 = min(accel_mps2, motion.ramp_acceleration_mps2)
     n = begin_hold(out, before, from_s, accel_mps2, hold_s, limit_mps)
     if out[n - 1, STATION] < 0.0:
         n = change_speed(out, n, road.ramp_speed_mps, motion)

@@ -52,7 +52,8 @@ class Outcome:
     """Everything that an engine hands to the metrics.
 
     ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
-    simulator made of it; for its own drivers both are its steps. ``end_s`` is when the run ended or
+    simulator made of it; for its own drivers both are its steps. ``driven_lane`` has a code for
+    each driven piece where the simulator's positions were read. ``end_s`` is when the run ended or
     was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
     places in ``passages``. ``told`` are the messages, where they were to be kept.
     """
@@ -67,6 +68,7 @@ class Outcome:
     decisions: tuple[DecisionRecord, ...] = ()
     refusals: tuple[Refusal, ...] = ()
     interventions: int = 0
+    driven_lane: IntArray | None = None
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     told: Told | None = None
 

@@ -8,7 +8,7 @@ Row = dict[str, Any]
 """One row of a table, by column."""
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 4
+RESULT_VERSION = 5
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -133,6 +133,8 @@ _LATER_METRICS: Schema = {
     "breakdown_time_s": pl.Float64,
     "prebreakdown_flow_veh_h": pl.Float64,
     "discharge_flow_veh_h": pl.Float64,
+    "min_margin_equation": pl.Int64,
+    "min_merge_margin_m": pl.Float64,
 }
 """They stand at the end of ``runs.parquet``, so that what was there keeps its place."""
 
@@ -149,7 +151,9 @@ RUNS: Schema = {
     "planning_median_s": pl.Float64,
     "planning_p95_s": pl.Float64,
     **_LATER_METRICS,
+    "settings": pl.String,
 }
+"""``settings`` are the overrides as JSON, a dotted key each; ``overrides`` shows them."""
 PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
 MEASURED = ("wall_s", *PLANNING_TIMES)
 """Columns that hold wall times: all that differs between equal runs."""

@@ -18,6 +18,7 @@ from coramp.report.style import (
 )
 from coramp.studies.baseline_layout import CONTROLLED, DRIVER_GAP_S
 from coramp.studies.baseline_runs import GAP, LANE, STANDSTILL, settings_of
+from coramp.studies.overrides import overrides_of
 from coramp.studies.statistics import estimate
 
 FLOW = ["mainline_veh_h", "ramp_veh_h"]
@@ -112,7 +113,7 @@ def _at(rows: list[dict[str, Any]], flow: tuple[float, float]) -> list[dict[str,
 
 
 def _on_own_lane(row: dict[str, Any]) -> bool:
-    return LANE not in (row["overrides"] or "")
+    return LANE not in overrides_of(row)
 
 
 def _draw_gaps(axes: Axes, rows: list[dict[str, Any]]) -> None:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from coramp.report.style import BLACK, COLOURS, LINES, MARKERS, grid, legend_below, new_figure
 from coramp.scenarios.loading import load_scenario
+from coramp.studies.overrides import overrides_of
 from coramp.studies.sensitivity_layout import BREAKDOWN_DELAY_S
 from coramp.studies.statistics import estimate
 
@@ -58,10 +59,11 @@ def settings_of(runs: pl.DataFrame) -> dict[str, Settings]:
     The scenario's own value stands among them where there are runs without an override.
     """
     found: dict[str, Settings] = {}
-    for text in runs["overrides"].drop_nulls().unique(maintain_order=True):
-        if " " not in text:
-            key, value = text.split("=")
-            found.setdefault(key, []).append((float(value), text))
+    for run in runs.unique("overrides", keep="first", maintain_order=True).iter_rows(named=True):
+        overrides = overrides_of(run)
+        if len(overrides) == 1:
+            ((key, value),) = overrides.items()
+            found.setdefault(key, []).append((float(value), run["overrides"]))
     plain = runs.filter(pl.col("overrides").is_null())
     if not plain.is_empty():
         scenario = load_scenario(plain["scenario"][0]).model_dump()

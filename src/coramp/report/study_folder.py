@@ -4,9 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import polars as pl
+from pydantic import ValidationError
 
 from coramp.errors import CorampError
 from coramp.records.files import read_json
+from coramp.records.schemas import RUNS, Row
+from coramp.records.stored_checks import checked_frame, first_of
+from coramp.studies.definition import Study
 from coramp.studies.store import MARK
 
 DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline")
@@ -38,7 +42,7 @@ def read_study(folder: Path) -> StoredStudy:
     if not path.exists():
         raise CorampError(f"{folder}: is not finished; start its coramp study again")
     try:
-        every = pl.read_parquet(path)
+        every = checked_frame(path, pl.read_parquet(path), RUNS)
         runs = every.filter(pl.col("status") == "ok")
         asked, failed = content["study"], every.height - runs.height
         found = StoredStudy(folder, asked["layout"], asked["horizon_s"], runs, failed)
@@ -52,3 +56,14 @@ def read_study(folder: Path) -> StoredStudy:
     if runs.is_empty():
         raise CorampError(f"{folder}: no run went well; start its coramp study again")
     return found
+
+
+def checked_study(mark: Path, content: Row) -> Study:
+    """Returns the study that ``study.json`` describes; raises CorampError where it does not."""
+    versions = content.get("versions")
+    if not isinstance(versions, dict) or not all(isinstance(v, str) for v in versions.values()):
+        raise CorampError(f"{mark}: versions: is no list of versions; run the study again")
+    try:
+        return Study.model_validate(content.get("study"), strict=False)
+    except ValidationError as error:
+        raise CorampError(f"{mark}: study: {first_of(error)}; run the study again") from None

@@ -1,17 +1,18 @@
 """Writing reports and replays of what lies in a folder."""
 
+import shlex
 from pathlib import Path
 
 from coramp.errors import CorampError
 from coramp.records.files import write_text
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import MARK, read_run
+from coramp.records.run_folder import MARK, REPLAY, REPORT, read_run
 from coramp.report.page.pages import replay_page, run_page
 from coramp.report.page.study_page import study_page
-from coramp.scenarios.toml_files import builtin_names
+from coramp.scenarios.toml_files import builtin_names, override_text
 from coramp.studies.store import MARK as STUDY_MARK
 
-REPORT, REPLAY = "report.html", "replay.html"
+HORIZON = "simulation.horizon_s"
 
 
 def report(
@@ -63,15 +64,20 @@ def _repeat(stored: list[RunRecords]) -> list[str]:
     lines = []
     for content in (run.content for run in stored):
         horizon_s = content["specification"]["simulation"]["horizon_s"]
-        parts = [
-            f"coramp run {_scenario_file(content['scenario'])} --strategy {content['strategy']}",
-            f"--engine {content['engine']}",
-            f"--mainline {content['mainline_veh_h']:g} --ramp {content['ramp_veh_h']:g}",
-            f"--seed {content['seed']} --horizon {horizon_s:g}",
+        words = [
+            *("coramp", "run", _scenario_file(content["scenario"])),
+            *("--strategy", content["strategy"], "--engine", content["engine"]),
+            *("--mainline", f"{content['mainline_veh_h']:.12g}"),
+            *("--ramp", f"{content['ramp_veh_h']:.12g}"),
+            *("--seed", str(content["seed"]), "--horizon", f"{horizon_s:.12g}"),
         ]
         if content["drivers"]:
-            parts.append(f"--drivers {content['drivers']}")
-        parts += [f"--set {setting}" for setting in (content["overrides"] or "").split()]
-        lines.append(" ".join(parts))
+            words += ["--drivers", content["drivers"]]
+        for key, value in content["settings"].items():
+            if key != HORIZON:  # is given above
+                words += ["--set", override_text(key, value)]
+        lines.append(shlex.join(words))
+        if content["overrides"] and not content["settings"]:
+            lines.append(f"# an older coramp ran it, with {content['overrides']}")
     lines.append("# run.json has the full specification of each run")
     return lines

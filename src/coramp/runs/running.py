@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import metadata
@@ -17,17 +17,22 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
+from coramp.runs.unserved import unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.toml_files import key_parts
 from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
-from coramp.worlds.sumo.engine import SumoOptions, run_cooperative, run_uncontrolled
+from coramp.worlds.sumo.engine import (
+    LARGEST_PLAN_ERROR_M,
+    SumoOptions,
+    run_cooperative,
+    run_uncontrolled,
+)
 
 ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
-LARGEST_PLAN_ERROR_M = 0.05
 FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
 OPTIONS = {
     "mainline.flow_veh_h": "--mainline",
@@ -77,10 +82,21 @@ class RunSpec:
             "overrides": " ".join(f"{key}={value}" for key, value in self.overrides) or None,
         }
 
+    @property
+    def settings(self) -> str | None:
+        """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
+        return json.dumps(dict(self.overrides), default=str) if self.overrides else None
+
     def as_data(self) -> Row:
         """Returns the specification as plain data."""
         content = self.scenario.model_dump(mode="json")
-        return {"run_id": self.run_id, **self.keys, "specification": content}
+        settings = json.loads(self.settings or "{}")
+        return {
+            "run_id": self.run_id,
+            **self.keys,
+            "settings": settings,
+            "specification": content,
+        }
 
 
 def make_spec(
@@ -117,6 +133,8 @@ def make_spec(
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
+        raise CorampError(loaded.drift_problem)
     if is_metered(chosen) and loaded.signal_problem:
         raise CorampError(loaded.signal_problem)
     population = None
@@ -182,13 +200,23 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         **tables.metrics,
         "wall_s": time.perf_counter() - started,
         **dict(zip(PLANNING_TIMES, strategy.planning_times_s(), strict=True)),
+        "settings": spec.settings,
     }
     return tables, row
 
 
-def recorded(spec: RunSpec, options: SumoOptions | None = None) -> RunRecords:
-    """Returns the records of a run, made now; raises CorampError where it fails."""
+def recorded(
+    spec: RunSpec,
+    options: SumoOptions | None = None,
+    notice: Callable[[str], None] = lambda _: None,
+) -> RunRecords:
+    """Returns the records of a run, made now; raises CorampError where it fails.
+
+    ``notice`` is told where vehicles were left unserved.
+    """
     tables, row = execute(spec, options)
+    if (line := unserved_line(tables.outcome)) is not None:
+        notice(line)
     return RunRecords(run_content(spec, row), row, **tables.frames())
 
 
@@ -203,6 +231,7 @@ def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
         **nothing,
         "wall_s": wall_s,
         **dict.fromkeys(PLANNING_TIMES),
+        "settings": spec.settings,
     }
 
 

@@ -21,7 +21,7 @@ def problems_of(scenario: "Scenario") -> list[str]:
     """Returns a line ``key: what is wrong; what is allowed`` for all that does not fit."""
     problems = [*_speed_problems(scenario), *_place_problems(scenario), *_flow_problems(scenario)]
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
-    problems += _driver_problems(scenario)
+    problems += [*_motion_problems(scenario), *_driver_problems(scenario)]
     return problems or _planning_problems(scenario)
 
 
@@ -46,6 +46,18 @@ def _speed_problems(scenario: "Scenario") -> list[str]:
                     f"allowed is up to {stream.limit_mps:g} m/s"
                 )
     return problems
+
+
+def _motion_problems(scenario: "Scenario") -> list[str]:
+    """What every plan uses must be within what the checker lets pass."""
+    motion = scenario.motion
+    used = ("slow_down_mps2", "speed_up_mps2")
+    hardest = max(used, key=lambda key: float(getattr(motion, key)))
+    least = float(getattr(motion, hardest))
+    if motion.comfort_mps2 >= least:
+        return []
+    line = f"motion.comfort_mps2: {motion.comfort_mps2:g} is below motion.{hardest}, which all"
+    return [f"{line} plans use; allowed is {least:g} to 10 m/s2"]
 
 
 def _place_problems(scenario: "Scenario") -> list[str]:

@@ -1,6 +1,7 @@
 """Reading TOML files: built-in or the user's, with overrides, into models, with clear errors."""
 
 import difflib
+import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,15 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from coramp.errors import CorampError
+from coramp.scenarios.plain_data import (
+    DEEPEST,
+    TOO_DEEP,
+    TOO_LARGE,
+    TOO_LONG_KEY,
+    long_key_in,
+    problem_with,
+    shortened,
+)
 
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
 Data = dict[str, Any]
@@ -54,15 +64,29 @@ def read(kind: str, name: str) -> tuple[str, Data]:
         text = _builtin(kind, name)
     else:
         label, text = name, _text_of(Path(name), kind)
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise CorampError(f"{label}: {error}; allowed is TOML") from error
+    data = _parsed(text, label)
     if not data:
         raise CorampError(
             f"{label}: the file is empty; allowed is TOML that describes {_what(kind)}"
         )
     return label, data
+
+
+def _parsed(text: str, label: str) -> Data:
+    """Returns the content of a TOML text; errors begin with the label."""
+    if (key := long_key_in(text)) is not None:
+        raise CorampError(f"{label}: {key}: {TOO_LONG_KEY}")
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CorampError(f"{label}: {error}; allowed is TOML") from error
+    except RecursionError:
+        raise CorampError(f"{label}: {TOO_DEEP}") from None
+    except ValueError:  # Python converts no number of more than 4300 digits
+        raise CorampError(f"{label}: a number {TOO_LARGE}") from None
+    if (problem := problem_with(data)) is not None:
+        raise CorampError(f"{label}: {problem}")
+    return data
 
 
 def _text_of(path: Path, kind: str) -> str:
@@ -93,17 +117,49 @@ def parse_overrides(texts: Sequence[str]) -> dict[str, Any]:
             raise CorampError(f"--set: {key.strip()}: given twice; allowed is once")
         if "\n" in text:
             raise CorampError(f"--set: {text}: has a line break; allowed is one KEY=VALUE")
-        try:
-            overrides[key.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            overrides[key.strip()] = value.strip()
+        overrides[key.strip()] = _value_of(key.strip(), value)
     return overrides
+
+
+def override_text(key: str, value: Any) -> str:
+    """Returns the text ``KEY=VALUE`` that ``parse_overrides`` makes these of."""
+    if isinstance(value, str) and value == value.strip() and _value_of(key, value) == value:
+        return f"{key}={value}"  # a word that needs no quotes
+    return f"{key}={_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case list() | tuple():
+            return f"[{', '.join(map(_toml, value))}]"
+        case dict():
+            inner = (f"{json.dumps(str(name))} = {_toml(v)}" for name, v in value.items())
+            return f"{{{', '.join(inner)}}}"
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case _:
+            return repr(value)
+
+
+def _value_of(key: str, text: str) -> Any:
+    blamed = f"--set: {shortened(key)}"
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    except RecursionError:
+        raise CorampError(f"{blamed}: {TOO_DEEP}") from None
+    except ValueError:
+        raise CorampError(f"{blamed}: {TOO_LARGE}") from None
 
 
 def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[str, str]) -> Data:
     """Returns a copy of the data with dotted keys set; ``origins`` says who set each."""
     result = _copied(data)
     for dotted, value in overrides.items():
+        _check_override(dotted, value, origins.get(dotted, ""))
         *parents, last = key_parts(data, dotted)
         table = result
         for parent in parents:
@@ -113,6 +169,13 @@ def with_overrides(data: Data, overrides: Mapping[str, Any], origins: Mapping[st
                 raise CorampError(_blamed(line, origins[dotted]))
         table[last] = value
     return result
+
+
+def _check_override(dotted: str, value: Any, origin: str) -> None:
+    if dotted.count(".") >= DEEPEST:
+        raise CorampError(_blamed(f"{shortened(dotted)}: {TOO_LONG_KEY}", origin))
+    if (problem := problem_with(value, dotted)) is not None:
+        raise CorampError(_blamed(problem, origin))
 
 
 def key_parts(data: Any, dotted: str) -> list[str]:

@@ -88,7 +88,8 @@ class LeastEffort:
             committed(fleet, situation.subject), situation.from_s
         )
         duration_s = merge_s - situation.from_s
-        v0 = rules.road.mainline_speed_mps
+        v0, motion = rules.road.mainline_speed_mps, rules.motion
+        most_mps2 = min(motion.comfort_mps2, motion.ramp_acceleration_mps2)
         if duration_s <= 2.0 * self.hold_s:
             return None
         periods = min(MOST_PERIODS, math.ceil(duration_s / self.hold_s))
@@ -98,7 +99,7 @@ class LeastEffort:
             limit_mps = np.where(np.arange(periods) < on_ramp, rules.road.ramp_limit_mps, v0)
             limit_mps[-1] = v0
             accel_mps2 = constrained_optimum(
-                merge_m - start_m, duration_s, start_mps, v0, rules.motion.comfort_mps2, limit_mps
+                merge_m - start_m, duration_s, start_mps, v0, most_mps2, limit_mps
             )
             if accel_mps2 is None:
                 return None
@@ -124,19 +125,14 @@ class LeastEffort:
         merge_s: float,
         rules: Rules,
     ) -> bool:
-        clearance_m = following_clearance_m(rules.road, rules.safety)
-        order, places_m = situation.order, situation.intercepts_m
-        for k in range(first, len(order)):
-            if back_m <= SAME_PLACE_M:
-                break
-            row = int(order[k])
-            pieces = self.way_back(fleet, row, situation.from_s, merge_s, back_m, rules)
-            if pieces is None or proposal.size[0] >= MAX_CHANGED:
+        shifts = _shifts(fleet, situation, first, back_m, rules)
+        if shifts is None:
+            return False
+        for row, shift_m in shifts:
+            pieces = self.way_back(fleet, row, situation.from_s, merge_s, shift_m, rules)
+            if pieces is None:
                 return False
             _add(proposal, row, pieces, float(fleet.merge_time_s[row]))
-            if k + 1 < len(order):
-                spare_m = places_m[k] - fleet.length_m[row] - places_m[k + 1] - clearance_m
-                back_m = cascade_shift_m(back_m, float(spare_m), 0.0, 0.0)
         return True
 
     def way_back(
@@ -159,6 +155,26 @@ class LeastEffort:
         if n == 0 or pieces[:, 2].min() < min(slowest, station_and_speed(pieces, from_s)[1]):
             return None
         return pieces if hardest_mps2 <= rules.motion.comfort_mps2 else None
+
+
+def _shifts(
+    fleet: Fleet, situation: Situation, first: int, back_m: float, rules: Rules
+) -> list[tuple[int, float]] | None:
+    """Returns who has to fall back by how much (m), None where they are more than may change."""
+    clearance_m = following_clearance_m(rules.road, rules.safety)
+    order, places_m = situation.order, situation.intercepts_m
+    shifts: list[tuple[int, float]] = []
+    for k in range(first, len(order)):
+        if back_m <= SAME_PLACE_M:
+            break
+        if len(shifts) + 1 >= MAX_CHANGED:  # the subject is one of them
+            return None
+        row = int(order[k])
+        shifts.append((row, back_m))
+        if k + 1 < len(order):
+            spare_m = places_m[k] - fleet.length_m[row] - places_m[k + 1] - clearance_m
+            back_m = cascade_shift_m(back_m, float(spare_m), 0.0, 0.0)
+    return shifts
 
 
 def _rung(situation: Situation, target_m: float, back_m: float) -> tuple[int, int]:

@@ -6,7 +6,7 @@ A package adds its own by an entry point of the group ``coramp.strategies``.
 from functools import cache
 from importlib import metadata
 
-from coramp.errors import CorampError
+from coramp.errors import CorampError, printable
 from coramp.strategies.alinea import Alinea
 from coramp.strategies.base import Strategy
 from coramp.strategies.dp_sequence import DpSequence
@@ -105,12 +105,13 @@ def _installed() -> dict[str, tuple[type[Strategy] | None, str]]:
         origin = f"{package.name} {package.version}" if package is not None else point.value
         try:
             loaded = point.load()
-        except Exception as error:  # noqa: BLE001 - a package's mistake must not stop the others
-            reason = f"{type(error).__name__}: {error}"
-        else:
             reason = _wrong_with(loaded, point.name)
-        told = f"strategy {point.name} of {origin}: {reason}"
-        found[point.name] = (None, told) if reason else (loaded, origin)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001 - a package may raise anything, or exit
+            reason = f"{type(error).__name__}: {error}"
+        told = printable(f"strategy {point.name} of {origin}: {reason}")
+        found[printable(point.name)] = (None, told) if reason else (loaded, origin)
     return found
 
 
@@ -120,6 +121,10 @@ def _wrong_with(loaded: object, name: str) -> str:
     ]
     if not isinstance(loaded, type) or lacking:
         return f"is no strategy: it lacks {', '.join(lacking) or 'a class'}"
+    if not isinstance(loaded.summary, str):  # type: ignore[attr-defined]
+        return "its summary is no text"
+    if printable(name) != name:
+        return "its name has characters that cannot be printed"
     if loaded.name != name:  # type: ignore[attr-defined]
         return f"calls itself {loaded.name!r}"  # type: ignore[attr-defined]
     return f"{name} is coramp's own name" if name in _STRATEGIES else ""

@@ -36,6 +36,8 @@ from coramp.strategies.situation import (
 from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
 
 LEAST_EFFORT = LeastEffort()
+MOST_GAPS = 24
+"""So many gaps are tried at one decision; who fits in none of them is planned again later."""
 LATER_FIRST = 0.25
 """Of two gaps as far from the chosen one, the later is tried first."""
 
@@ -102,7 +104,8 @@ def decide_in_sequence(
     """Returns the decision for the first subject, in the gap that the sequencer chooses.
 
     In each gap the trajectories of least effort come first, then those of the ladder's rungs. If
-    neither can be driven, the gaps around it are tried, nearest first, or only later ones.
+    neither can be driven, the gaps around it are tried, nearest first, or only later ones, up to
+    ``MOST_GAPS``.
     """
 
     def planner(
@@ -113,7 +116,7 @@ def decide_in_sequence(
         seen = crossings(fleet, row, situation.from_s, rules)
         chosen, count = sequencer(seen), len(seen.mainline_s) + 1
         gaps = np.arange(chosen, count) if later_only else gaps_around(chosen, count)
-        for place in range(len(gaps)):
+        for place in range(min(len(gaps), MOST_GAPS)):
             plan, proposal = least_effort.plan(fleet, situation, int(gaps[place]), rules)
             if plan is not None:
                 return plan, proposal, *ramp_neighbours(fleet, row, situation.from_s)

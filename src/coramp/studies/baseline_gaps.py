@@ -15,6 +15,7 @@ from coramp.studies.baseline_runs import (
     matching,
     set_only,
 )
+from coramp.studies.overrides import overrides_of
 from coramp.studies.tables import Table
 
 COORDINATED = ("slots", "fifo-optimal-control", "mainline-priority", "ramp-priority")
@@ -49,9 +50,9 @@ def _followers(drivers: pl.DataFrame) -> list[pl.DataFrame]:
 
 def _equal_gaps(drivers: pl.DataFrame, plans: pl.DataFrame, flows: list[Flow]) -> list[Table]:
     plain = matching(plans, standstill=0.0)
-    gaps = {settings[GAP] for settings in plain["settings"].to_list()}
+    gaps = {settings[GAP] for settings in plain["said"].to_list()}
     for found in (_automated(drivers), *_followers(drivers)):
-        gaps |= {settings["tau_s"] for settings in found["settings"].to_list()}
+        gaps |= {settings["tau_s"] for settings in found["said"].to_list()}
     rows = [
         (f"{gap:g}" if gap else "Eq. 1", name, *delays(own, flows))
         for gap in sorted(gaps)
@@ -66,14 +67,14 @@ def _equal_gaps(drivers: pl.DataFrame, plans: pl.DataFrame, flows: list[Flow]) -
 
 
 def _equal_distances(drivers: pl.DataFrame, plans: pl.DataFrame, flows: list[Flow]) -> list[Table]:
-    apart = [s[STANDSTILL] for s in plans["settings"].to_list() if s[STANDSTILL] > 0.0]
+    apart = [s[STANDSTILL] for s in plans["said"].to_list() if s[STANDSTILL] > 0.0]
     rows = []
     for standstill_m in sorted(set(apart)):
         kept = matching(plans, standstill=standstill_m)
         same = matching(drivers, min_gap_m=standstill_m)
         rows += [
             (f"{gap:g} s, {standstill_m:g} m", name, *delays(own, flows))
-            for gap in sorted({settings[GAP] for settings in kept["settings"].to_list()})
+            for gap in sorted({settings[GAP] for settings in kept["said"].to_list()})
             for name, own in (*_krauss(same, gap), *_coordinated(matching(kept, gap=gap)))
             if not own.is_empty()
         ]
@@ -100,7 +101,8 @@ def _coordinated(plans: pl.DataFrame) -> Cases:
 
 
 def _without_lanes(plans: pl.DataFrame) -> pl.DataFrame:
-    return plans.filter(~pl.col("overrides").fill_null("").str.contains(LANE, literal=True))
+    kept = [LANE not in overrides_of(run) for run in plans.iter_rows(named=True)]
+    return plans.filter(pl.Series(kept, dtype=pl.Boolean))
 
 
 def _as_they_are(drivers: pl.DataFrame) -> list[Table]:

@@ -42,7 +42,7 @@ def _rates(runs: pl.DataFrame) -> list[Table]:
             own = drivers.filter(pl.col("overrides").fill_null("") == text, drivers=population)
             if own.is_empty():
                 continue
-            said = own["settings"][0]
+            said = own["said"][0]
             controlled = matching(
                 runs.filter(strategy=CONTROLLED), lane=said[LANE], gap=0.0, standstill=0.0
             )

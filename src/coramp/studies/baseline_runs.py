@@ -19,9 +19,9 @@ Flow = tuple[float, float]
 
 
 def with_settings(good: pl.DataFrame) -> pl.DataFrame:
-    """Returns runs with a column ``settings``, as ``settings_of`` finds them."""
+    """Returns runs with a column ``said``, as ``settings_of`` finds them."""
     found = [settings_of(run) for run in good.iter_rows(named=True)]
-    return good.with_columns(settings=pl.Series(found, dtype=pl.Object))
+    return good.with_columns(said=pl.Series(found, dtype=pl.Object))
 
 
 def settings_of(run: dict[str, Any]) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def matching(runs: pl.DataFrame, **wanted: Any) -> pl.DataFrame:
     keys = {"lane": LANE, "gap": GAP, "standstill": STANDSTILL}
     kept = [
         all(settings.get(keys.get(k, k)) == v for k, v in wanted.items())
-        for settings in runs["settings"].to_list()
+        for settings in runs["said"].to_list()
     ]
     return runs.filter(pl.Series(kept, dtype=pl.Boolean))
 

@@ -1,8 +1,9 @@
 """Where each strategy breaks down: the mainline flow by ramp flow, with its interval over seeds."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import polars as pl
 
@@ -36,6 +37,7 @@ class Breakdown:
     limit_veh_h: float | None = None
     scenario: str = ""
     seeds: tuple[int, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def by_seed(self) -> list[tuple[int, float]]:
@@ -50,17 +52,17 @@ class Breakdown:
     @property
     def name(self) -> str:
         """The combination in words."""
-        gap = gaps_in_words(self.overrides or "")
+        gap = gaps_in_words(self.settings)
         if self.drivers is None:
             return f"{self.strategy}, {gap or 'Eq. 1'}"
         own = gap.replace(f"drivers.{self.drivers}.", "")
         return f"{self.strategy} ({self.drivers}){', ' + own if own else ''}"
 
 
-def gaps_in_words(overrides: str) -> str:
+def gaps_in_words(settings: Mapping[str, Any]) -> str:
     """Returns overrides in words; gaps by their values alone."""
     words = []
-    for key, value in overrides_of({"overrides": overrides}).items():
+    for key, value in settings.items():
         if key in UNITS and not value:
             continue
         override = f"{key}={value}"
@@ -107,6 +109,7 @@ def _breakdown(
         limit_veh_h if isinstance(limit_veh_h, float) else None,
         str(group["scenario"][0]),
         tuple(seeds),
+        overrides_of(group.row(0, named=True)),
     )
 
 

@@ -35,6 +35,11 @@ def connected(address: str) -> Iterator[int]:
             f"--cluster: {address}: no Dask scheduler answers ({reason}); "
             "allowed is an address like tcp://host:8786"
         ) from error
+    except Exception as error:  # bytes of another protocol become lengths, or break Dask's asserts
+        raise CorampError(
+            f"--cluster: {address}: what answers there is no Dask scheduler "
+            f"({type(error).__name__}); allowed is an address like tcp://host:8786"
+        ) from error
     with client:
         _check_workers(client, address)
         with joblib.parallel_config(backend="dask"):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from coramp.errors import CorampError
 from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
@@ -98,9 +98,12 @@ class Search(Model):
 
 
 class Study(Model):
-    """A named set of grids on one scenario; ``layout`` says which tables sum it up."""
+    """A named set of grids on one scenario; ``layout`` says which tables sum it up.
 
-    name: Annotated[str, Field(min_length=1)]
+    Its name is that of its folder below ``out/``.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
     description: str = ""
     scenario: str
     seeds: Annotated[int, Field(ge=1, le=100000)] = 3
@@ -110,6 +113,16 @@ class Study(Model):
     horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
     runs: Annotated[tuple[Grid, ...], Field(strict=False)] = ()
     searches: Annotated[tuple[Search, ...], Field(strict=False)] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        if name.strip(" .") != name or not name.isprintable() or set(name) & set("/\\"):
+            raise ValueError(
+                f"name: {name!r} cannot be the name of a folder; allowed are letters, digits, "
+                "dashes, and spaces and dots inside"
+            )
+        return name
 
     @model_validator(mode="after")
     def _asks_something(self) -> Self:

@@ -3,9 +3,15 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from coramp.records.files import made_folder, staged_folder
+from coramp.records.files import made_folder
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import MARK, read_run, write_run
+from coramp.records.run_folder import (
+    MARK,
+    not_replaceable,
+    read_run,
+    write_run,
+)
+from coramp.records.staging import staged_folder
 from coramp.runs.running import RunSpec, make_spec, recorded
 from coramp.studies.runner import Progress
 from coramp.studies.store import Part
@@ -56,7 +62,7 @@ def drawn_runs(
     skipped = len(specs) - len(missing)
     report(Progress(len(specs), 0, skipped, 0, 0))
     for done, spec in enumerate(missing, 1):
-        with staged_folder(folder / spec.run_id, MARK) as stage:
+        with staged_folder(folder / spec.run_id, not_replaceable) as stage:
             records = recorded(spec)
             write_run(stage, records)
         report(Progress(len(specs), done, skipped, 0, 0, Part(records.summary, [])))

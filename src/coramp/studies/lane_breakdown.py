@@ -38,10 +38,10 @@ def lane_flows_veh_h(good: pl.DataFrame, horizon_s: float | None) -> dict[Key, f
         return {}
     resolution = min(b - a for a, b in pairwise(flows))
     steps = round((flows[-1] - flows[0]) / resolution)
-    keys = cooperative.select("scenario", "overrides", "ramp_veh_h", "seed").unique()
+    keys = cooperative.select("scenario", "overrides", "settings", "ramp_veh_h", "seed").unique()
     found: dict[Key, float] = {}
-    for scenario, overrides, ramp, seed in keys.iter_rows():
-        setting = (scenario, overrides or "", horizon_s, ramp, seed)
+    for scenario, overrides, settings, ramp, seed in keys.iter_rows():
+        setting = (scenario, settings, horizon_s, ramp, seed)
         low, high = -1, steps + 1
         while high - low > 1:
             middle = (low + high) // 2
@@ -58,16 +58,19 @@ def lane_flows_veh_h(good: pl.DataFrame, horizon_s: float | None) -> dict[Key, f
 @cache
 def least_delay_s(
     name: str,
-    overrides: str,
+    overrides_json: str | None,
     horizon_s: float | None,
     ramp_veh_h: float,
     seed: int,
     mainline_veh_h: float,
 ) -> float:
-    """Returns the mean delay (s) of all that no plan can beat, from the arrivals alone."""
+    """Returns the mean delay (s) of all that no plan can beat, from the arrivals alone.
+
+    ``overrides_json`` is what the column ``settings`` of ``runs.parquet`` holds.
+    """
     settings = {
         key: value
-        for key, value in overrides_of({"overrides": overrides}).items()
+        for key, value in overrides_of({"settings": overrides_json}).items()
         if not key.startswith("strategy.")  # of no effect on who arrives, nor on the lane
     }
     settings["mainline.flow_veh_h"], settings["ramp.flow_veh_h"] = mainline_veh_h, ramp_veh_h

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import polars as pl
 
-from coramp.records.files import made_folder, staged_folder
+from coramp.records.files import made_folder
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import MARK, read_run, write_run
+from coramp.records.run_folder import MARK, not_replaceable, read_run, write_run
 from coramp.records.schemas import Row
+from coramp.records.staging import staged_folder
 from coramp.runs.running import RunSpec, make_spec, recorded
 from coramp.studies.definition import Study
 
@@ -67,7 +68,7 @@ def keep_shown(
     say(f"keeping the records of {len(missing)} runs for the report")
     made_folder(folder / FOLDER)
     for row in missing:
-        with staged_folder(_place(folder, row), MARK) as stage:
+        with staged_folder(_place(folder, row), not_replaceable) as stage:
             write_run(stage, recorded(_again(study, row)))
 
 

@@ -15,8 +15,15 @@ from typing import Any
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.records.files import made_folder, read_json, write_json, write_parquet, write_text
-from coramp.records.schemas import RESULT_VERSION, RUNS, STREAMS, Row
+from coramp.records.files import (
+    made_folder,
+    read_json,
+    write_json,
+    write_parquet,
+    write_text,
+)
+from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAMS, Row
+from coramp.records.unfinished import is_unfinished
 from coramp.runs.running import RunSpec, versions
 from coramp.studies.definition import Study
 
@@ -82,12 +89,17 @@ class Store:
             return
         if self.folder.exists() and not self.folder.is_dir():
             raise CorampError(f"{self.folder}: is a file; give a folder")
-        if self.folder.exists() and any(f.name not in OURS for f in self.folder.iterdir()):
+        if self.folder.exists() and not self._is_ours():
             raise CorampError(
                 f"{self.folder}: holds other files and no study; give another or an empty folder"
             )
         made_folder(self.folder)
         write_json(mark, content)
+
+    def _is_ours(self) -> bool:
+        """Whether all in the folder is a study's; tables alone may be somebody else's."""
+        names = {entry.name for entry in self.folder.iterdir() if not is_unfinished(entry.name)}
+        return not names or (PARTS in names and names <= set(OURS))
 
     def _description(self) -> Row | None:
         """What the folder says of itself, None where that is missing or no JSON.
@@ -166,13 +178,16 @@ def _part_in(path: Path) -> Part | None:
     """The part in a file, None if it is missing, damaged or of another run than its name says."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        if content["sha256"] != _checksum(content["run"], content["streams"]):
+        run, streams = content["run"], content["streams"]
+        if content["sha256"] != _checksum(run, streams) or run["run_id"] != path.stem:
             return None
-        if content["run"]["run_id"] != path.stem:
+        if not {"status", *RUN_KEYS} <= run.keys() <= RUNS.keys():
             return None
-    except (OSError, ValueError, KeyError, TypeError):
+        if any(not {"run_id", "stream"} <= row.keys() <= STREAMS.keys() for row in streams):
+            return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return Part(_decoded(content["run"]), [_decoded(row) for row in content["streams"]])
+    return Part(_decoded(run), [_decoded(row) for row in streams])
 
 
 def _checksum(run: Row, streams: list[Row]) -> str:

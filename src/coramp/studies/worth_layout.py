@@ -5,7 +5,7 @@ from typing import Any
 import polars as pl
 
 from coramp.studies.capacity_layout import gaps_in_words
-from coramp.studies.overrides import setting_of
+from coramp.studies.overrides import overrides_of, setting_of
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import Table, number, with_interval
 
@@ -61,9 +61,9 @@ FIGURES = (
 
 def name_of(run: dict[str, Any]) -> str:
     """Returns who drove and at which gaps, in words."""
-    gaps = gaps_in_words(run["overrides"] or "")
+    gaps = gaps_in_words(overrides_of(run))
     if run["drivers"] is None:
-        kept = gaps_in_words(" ".join(f"{key}={setting_of(run, key)}" for key in GAPS))
+        kept = gaps_in_words({key: setting_of(run, key) for key in GAPS})
         others = [part for part in gaps.split(", ") if part and part not in kept]
         return ", ".join([run["strategy"], kept or "Eq. 1", *others])
     own = gaps.replace(f"drivers.{run['drivers']}.", "")

@@ -3,6 +3,8 @@
 import json
 from collections import OrderedDict
 from collections.abc import Mapping
+from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from threading import Lock
 
@@ -16,17 +18,20 @@ from coramp.report.page.shown import page_data
 from coramp.runs.running import RunSpec, recorded
 from coramp.studio.dials import NOTHING, Studio
 
+Played = tuple[RunRecords, str]
+"""A run, and what the page's scripts take for it."""
 KEPT_RUNS = 16
 """So many runs are remembered, so that going back to one shows it at once."""
 
 
 @dataclass
 class Answers:
-    """Answers a studio's page, one question at a time; remembers the last runs."""
+    """Answers a studio's page, several questions at a time; remembers the last runs."""
 
     studio: Studio
     _lock: Lock = field(default_factory=Lock)
-    _kept: OrderedDict[str, tuple[RunRecords, str]] = field(default_factory=OrderedDict)
+    _sumo: Lock = field(default_factory=Lock)
+    _kept: OrderedDict[str, "Future[Played]"] = field(default_factory=OrderedDict)
 
     @property
     def saved_name(self) -> str:
@@ -54,8 +59,7 @@ class Answers:
         """Returns JSON of the runs that are asked for, or of ``errors``."""
         try:
             specs = self.studio.specs(asked)
-            with self._lock:
-                found = [self._run(spec) for spec in specs]
+            found = [self._run(spec) for spec in specs]
         except CorampError as error:
             return json.dumps({"errors": [_plain(line) for line in error.messages]})
         runs = [run for run, _ in found]
@@ -78,16 +82,30 @@ class Answers:
             f"# Set in coramp studio; run it by\n# {self._command(spec)}\n{tomli_w.dumps(content)}"
         )
 
-    def _run(self, spec: RunSpec) -> tuple[RunRecords, str]:
-        if spec.run_id in self._kept:
+    def _run(self, spec: RunSpec) -> Played:
+        """Returns a run; who asks for one that is under way waits for it, and nobody else does."""
+        with self._lock:
+            found = self._kept.get(spec.run_id)
+            asked = found or Future[Played]()
+            self._kept[spec.run_id] = asked
             self._kept.move_to_end(spec.run_id)
-        else:
-            run = recorded(spec)
-            text = json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
-            self._kept[spec.run_id] = run, text
             while len(self._kept) > KEPT_RUNS:
                 self._kept.popitem(last=False)
-        return self._kept[spec.run_id]
+        if found is None:
+            try:
+                asked.set_result(self._played(spec))
+            except BaseException as error:
+                asked.set_exception(error)
+                with self._lock:
+                    self._kept.pop(spec.run_id, None)
+                raise
+        return asked.result()
+
+    def _played(self, spec: RunSpec) -> Played:
+        # There is one SUMO in a process; the exact engine can run any number of times at once.
+        with self._sumo if spec.engine == "sumo" else nullcontext():
+            run = recorded(spec)
+        return run, json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
 
     def _command(self, spec: RunSpec) -> str:
         drivers = f" --drivers {spec.drivers}" if spec.drivers else ""

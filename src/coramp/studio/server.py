@@ -1,8 +1,11 @@
 """The studio's server: this machine only, three addresses, nothing kept."""
 
 import errno
+import socket
 import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
@@ -13,6 +16,8 @@ from coramp.studio.answers import Answers
 from coramp.studio.dials import studio_of
 
 HOST = "127.0.0.1"
+READ_S = 10.0
+"""So long a client may take to send a request, and to take a piece of the answer."""
 HTML, JSON, TOML = "text/html", "application/json", "application/toml"
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -30,6 +35,7 @@ class StudioServer(ThreadingHTTPServer):
         if not 0 <= port <= 65535:
             raise CorampError(f"--port: {port} is out of range; allowed is 0 (any) to 65535")
         self.answers = Answers(studio_of(scenario))
+        self.reading: dict[socket.socket, float] = {}
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
@@ -49,11 +55,19 @@ class StudioServer(ThreadingHTTPServer):
         """What browsers may call this server; a foreign name could be another site's."""
         return {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
 
+    def service_actions(self) -> None:
+        """Hangs up on clients that take too long to send a request; called twice a second."""
+        now_s = time.monotonic()
+        for connection, until_s in list(self.reading.items()):
+            if now_s > until_s:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that went away is no error; says anything else in one line."""
         del request, client_address
         error = sys.exc_info()[1]
-        if not isinstance(error, ConnectionError):
+        if not isinstance(error, ConnectionError | TimeoutError):
             print(f"Error: {type(error).__name__}: {error}", file=sys.stderr)
 
 
@@ -61,16 +75,33 @@ class _Handler(BaseHTTPRequestHandler):
     server: StudioServer
     protocol_version = "HTTP/1.1"
     paths: ClassVar[dict[str, str]] = {"/": HTML, "/runs": JSON, "/scenario.toml": TOML}
+    timeout = READ_S
+
+    def handle_one_request(self) -> None:
+        """Reads a request and answers it; the server hangs up if reading takes too long."""
+        self.server.reading[self.connection] = time.monotonic() + READ_S
+        try:
+            super().handle_one_request()
+        finally:
+            self.server.reading.pop(self.connection, None)
 
     def do_GET(self) -> None:
+        self.server.reading.pop(self.connection, None)
         if self.headers.get("Host") not in self.server.names:
             return self._send(HTTPStatus.FORBIDDEN, "text/plain", "another site's name\n")
-        asked = urlsplit(self.path)
+        if self.headers.get("Transfer-Encoding") or self.headers.get("Content-Length", "0") != "0":
+            self.close_connection = True  # or what follows would be read as the next request
+            return self._send(HTTPStatus.BAD_REQUEST, "text/plain", "a body is not read here\n")
+        try:
+            asked = urlsplit(self.path)
+            settings = dict(parse_qsl(asked.query, keep_blank_values=True))
+        except ValueError:
+            return self._send(HTTPStatus.BAD_REQUEST, "text/plain", "the address is not valid\n")
         kind = self.paths.get(asked.path)
         if kind is None:
             return self._send(HTTPStatus.NOT_FOUND, "text/plain", "there is no such page\n")
         try:
-            text = self._answer(asked.path, dict(parse_qsl(asked.query, keep_blank_values=True)))
+            text = self._answer(asked.path, settings)
         except CorampError as error:
             return self._send(HTTPStatus.BAD_REQUEST, "text/plain", "\n".join(error.messages))
         return self._send(HTTPStatus.OK, kind, text)
@@ -93,6 +124,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Security-Policy", POLICY)
         self.send_header("X-Content-Type-Options", "nosniff")
         self.send_header("Cache-Control", "no-store")
+        if self.close_connection:
+            self.send_header("Connection", "close")
         if kind == TOML:
             name = self.server.answers.saved_name
             self.send_header("Content-Disposition", f'attachment; filename="{name}.toml"')

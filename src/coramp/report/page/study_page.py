@@ -9,7 +9,8 @@ from coramp.errors import CorampError
 from coramp.records.files import read_json
 from coramp.records.run import RunRecords
 from coramp.records.run_folder import check_version
-from coramp.records.schemas import RESULT_VERSION, Row
+from coramp.records.schemas import RESULT_VERSION, RUNS, Row
+from coramp.records.stored_checks import checked_frame
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -20,6 +21,7 @@ from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
+from coramp.report.study_folder import checked_study
 from coramp.report.style import look_of
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.shown import (
@@ -58,7 +60,7 @@ def study_page(folder: Path) -> str:
     where there is no study, or none of its runs went well.
     """
     content = _content(folder)
-    study = Study.model_validate(content["study"], strict=False)
+    study = checked_study(folder / MARK, content)
     runs = _runs(folder, study)
     good = runs.filter(status="ok")
     if good.is_empty():
@@ -101,7 +103,7 @@ def _runs(folder: Path, study: Study) -> pl.DataFrame:
         store = Store(folder, study)
         return store.frames(store.everything())[0]
     try:
-        return pl.read_parquet(path)
+        return checked_frame(path, pl.read_parquet(path), RUNS)
     except (OSError, pl.exceptions.PolarsError) as error:
         raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
 

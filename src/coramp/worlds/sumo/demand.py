@@ -6,6 +6,8 @@ from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.worlds.sumo.traits import Traits
 
+FASTEST_COMMAND_MPS = 100.0
+"""The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
   <route id="ramp" edges="{ramp} merge downstream"/>"""
 
@@ -20,7 +22,7 @@ def cooperative_types(arrivals: Sequence[Arrival]) -> list[str]:
     lengths_m = sorted({arrival.length_m for arrival in arrivals})
     return [
         f'  <vType id="{cooperative_type(length_m)}" length="{length_m!r}" '
-        'speedFactor="1" speedDev="0"/>'
+        f'maxSpeed="{FASTEST_COMMAND_MPS!r}" speedFactor="1" speedDev="0"/>'
         for length_m in lengths_m
     ]
 

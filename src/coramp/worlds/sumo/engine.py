@@ -22,6 +22,7 @@ from coramp.messages.feed import RequestFeed
 from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.outcome import Outcome, Pieces
+from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.worlds.outcomes import (
@@ -49,7 +50,8 @@ from coramp.worlds.telling import reports_of_samples, together
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
-LOOPS = "loops.add.xml"
+LARGEST_PLAN_ERROR_M = 0.05
+"""A run in which SUMO is further off a plan has not kept its promise."""
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
 
 
@@ -81,14 +83,28 @@ def run_cooperative(
 ) -> Outcome:
     """Returns what happened with cooperative vehicles under a strategy.
 
-    Raises CorampError where SUMO fails, or still has vehicles that should have left.
+    What they drove is known from commands and from where each met its vehicle, as long as SUMO
+    keeps to the plan. Where it does not, the run is done again and SUMO's positions are read, so
+    that figures of safety are those of what happened. Raises CorampError where SUMO fails, or still
+    has vehicles that should have left.
     """
+    outcome = _run_cooperative(scenario, strategy, seed, options, sampled=False)
+    if np.nanmax(outcome.passages.plan_error_m, initial=0.0) <= LARGEST_PLAN_ERROR_M:
+        return outcome
+    return _run_cooperative(scenario, strategy, seed, options, sampled=True)
+
+
+def _run_cooperative(
+    scenario: Scenario, strategy: Decider, seed: int, options: SumoOptions, sampled: bool
+) -> Outcome:
     rules = scenario.rules()
     arrivals = arrivals_of(scenario, seed)
     plan = road_plan(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         keep = options.keep_messages
-        files = _Files(Path(name), scenario, plan, seed, options, ballistic=True, sampled=keep)
+        files = _Files(
+            Path(name), scenario, plan, seed, options, ballistic=True, sampled=sampled or keep
+        )
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
         with Session(
             [*files.options(), "--insertion-checks", "none"], rules.control.step_s, options.gui
@@ -113,7 +129,7 @@ def run_cooperative(
             files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=True))
         files.keep()
         collisions = files.collisions()
-        samples = files.samples(arrivals) if keep else None
+        samples = files.samples(arrivals) if sampled or keep else None
     outcome = cooperative_outcome(
         coordinator,
         arrivals,
@@ -125,17 +141,27 @@ def run_cooperative(
     )
     if samples is None:
         return outcome
-    positions = together(
-        (
-            reports_of_samples(*_motion_of(samples), rules.control.step_s),
-            positions_in_sumo(plant, outcome.vehicle_of_row, rules.control.step_s),
+    if keep:
+        positions = together(
+            (
+                reports_of_samples(*_motion_of(samples), rules.control.step_s),
+                positions_in_sumo(plant, outcome.vehicle_of_row, rules.control.step_s),
+            )
         )
-    )
-    return replace(outcome, told=Told(arrivals, channel.commands, positions, (), end_step))
+        told = Told(arrivals, channel.commands, positions, (), end_step)
+        outcome = replace(outcome, told=told)
+    return _as_seen(outcome, samples) if sampled else outcome
 
 
 def _motion_of(samples: Samples) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
     return samples.vehicle, samples.time_s, samples.station_m, samples.speed_mps
+
+
+def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:
+    """Returns the outcome with what vehicles drove as SUMO's positions have it, at each step."""
+    first, rows = pieces_of_samples(*_motion_of(samples), len(outcome.passages))
+    lane = np.where(samples.on_mainline, MAINLINE, RAMP)
+    return replace(outcome, driven=Pieces(first, rows), driven_lane=lane)
 
 
 def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) -> Pieces:
@@ -265,10 +291,10 @@ class _Files:
         (self._folder / "routes.rou.xml").write_text(text)
 
     def write_loops(self, text: str) -> None:
-        (self._folder / LOOPS).write_text(text)
+        (self._folder / SUMO_LOOPS).write_text(text)
 
     def _loops(self, name: Path) -> list[str]:
-        return ["--additional-files", str(name)] if (self._folder / LOOPS).exists() else []
+        return ["--additional-files", str(name)] if (self._folder / SUMO_LOOPS).exists() else []
 
     def options(self) -> list[str]:
         """Returns SUMO's options, output files included."""
@@ -278,7 +304,7 @@ class _Files:
             *("--route-files", str(folder / "routes.rou.xml")),
             *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
-            *self._loops(folder / LOOPS),
+            *self._loops(folder / SUMO_LOOPS),
         ]
         if self._ballistic:
             result.append("--step-method.ballistic")
@@ -296,19 +322,19 @@ class _Files:
         if self._keep_in is None:
             return
         self._keep_in.mkdir(parents=True, exist_ok=True)
-        shutil.copy(network_file(self._plan), self._keep_in / "net.net.xml")
-        for name in ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml"):
+        shutil.copy(network_file(self._plan), self._keep_in / SUMO_NETWORK)
+        for name in SUMO_COPIES:
             shutil.copy(self._folder / name, self._keep_in / name)
-        if self._loops(Path(LOOPS)):
-            shutil.copy(self._folder / LOOPS, self._keep_in / LOOPS)
+        if self._loops(Path(SUMO_LOOPS)):
+            shutil.copy(self._folder / SUMO_LOOPS, self._keep_in / SUMO_LOOPS)
         command = [
-            *("sumo", "--net-file", "net.net.xml", "--route-files", "routes.rou.xml"),
+            *("sumo", "--net-file", SUMO_NETWORK, "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
-            *self._loops(Path(LOOPS)),
+            *self._loops(Path(SUMO_LOOPS)),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *(("--step-method.ballistic",) if self._ballistic else ()),
         ]
-        (self._keep_in / "command.txt").write_text(" ".join(command) + "\n")
+        (self._keep_in / SUMO_COMMAND).write_text(" ".join(command) + "\n")
 
     def collisions(self) -> int:
         """Returns how many pairs of vehicles SUMO saw collide."""

@@ -14,6 +14,7 @@ from typing import Any, Self
 import libsumo as untyped_libsumo
 
 from coramp.errors import CorampError
+from coramp.worlds.sumo.demand import FASTEST_COMMAND_MPS
 from coramp.worlds.sumo.network import sumo_binary
 
 libsumo: Any = untyped_libsumo
@@ -23,7 +24,6 @@ OBEY = 32
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
 GREEN, YELLOW, RED = "G", "y", "r"
-FASTEST_COMMAND_MPS = 100.0
 ACTION_S = 1.0
 """How often SUMO lets a vehicle that was taken over look around.
 
@@ -73,8 +73,11 @@ class Session:
             Session._free.release()
 
     def step_to(self, step: int) -> None:
-        """Executes all steps before ``step``."""
-        libsumo.simulationStep(step * self._step_s)
+        """Executes all steps before ``step``; raises CorampError where SUMO gives up."""
+        try:
+            libsumo.simulationStep(step * self._step_s)
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise CorampError(f"SUMO: {error}") from error
 
     def vehicles_left(self) -> int:
         """Returns how many vehicles drive or are still to enter."""

@@ -20,6 +20,6 @@ def send_native_output_to_stderr() -> None:
         os.dup2(STDERR, STDOUT)
     except (OSError, ValueError, AttributeError):  # closed, or replaced by what is no file
         return
-    sys.stdout = open(  # noqa: SIM115 - for as long as the program runs
+    sys.stdout = open(  # noqa: SIM115, PTH123 - a descriptor, for as long as the program runs
         kept, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors
     )

@@ -1,0 +1,5 @@
+"""``python -m coramp``: the command line."""
+
+from coramp.cli import main
+
+main()

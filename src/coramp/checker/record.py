@@ -1,0 +1,171 @@
+"""What the checker has been told of every vehicle: how long it is, its stream, its commands.
+
+The checker reads nothing else. Where a vehicle is, on which lane, how fast, and whether it is still
+on the road follows from its commands by the checker's own mathematics, not from the bookkeeping of
+the loop.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import FloatArray, IntArray, kernel
+from coramp.checker.distances import passes_s
+from coramp.checker.pairs import Way
+
+FIRST, COUNT = range(2)
+"""Columns of ``Record.places``."""
+LENGTH, MERGE, EXIT = range(3)
+"""Columns of ``Record.traits``."""
+ROWS, PIECES, LIVE, LONGEST = range(4)
+"""Places in ``Record.used``; the last is the largest number of pieces that a row has had."""
+
+
+class Record(NamedTuple):
+    """All that was commanded, with room to spare; ``used`` tells how much of what is in use.
+
+    Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. It is
+    ``traits[i, 0]`` long (m), comes onto the mainline at ``traits[i, 1]`` (s; minus infinity for a
+    mainline vehicle, infinity while no merge is commanded) and leaves the zone at ``traits[i, 2]``
+    (s; infinity while it would stop before). ``live`` lists the rows on the road, by entry.
+    """
+
+    pieces: FloatArray
+    places: IntArray
+    traits: FloatArray
+    live: IntArray
+    used: IntArray
+
+
+def empty_record(rows: int, pieces: int) -> Record:
+    """Returns a record with room for so many rows and pieces."""
+    return Record(
+        np.empty((pieces, 4)),
+        np.zeros((rows, 2), np.int64),
+        np.full((rows, 3), math.inf),
+        np.zeros(rows, np.int64),
+        np.zeros(4, np.int64),
+    )
+
+
+def with_room(record: Record, commands: int, most_pieces: int) -> Record:
+    """Returns the record, or another one where a row and so many commands do not fit.
+
+    ``most_pieces`` is the most that one command may have. What vehicles drove that are off the road
+    is forgotten first, so that the record of a long run stays small.
+    """
+    rows, pieces = len(record.live), len(record.pieces)
+    in_use, filled, _, longest = record.used.tolist()
+    more = commands * (longest + most_pieces)
+    if in_use < rows and filled + more <= pieces:
+        return record
+    on_road = _pieces_on_road(record)
+    while on_road + more > pieces // 2:
+        pieces *= 2
+    other = empty_record(rows if in_use < rows else 2 * rows, pieces)
+    _copy_live(record, other)
+    return other
+
+
+@kernel
+def _pieces_on_road(record: Record) -> int:
+    """Returns how many pieces those who are on the road have."""
+    count = 0
+    for row in record.live[: record.used[LIVE]]:
+        count += record.places[row, COUNT]
+    return count
+
+
+@kernel
+def _copy_live(record: Record, other: Record) -> None:
+    """Copies everything but the pieces of those who are off the road into an empty record."""
+    rows, live = record.used[ROWS], record.used[LIVE]
+    other.traits[:rows] = record.traits[:rows]
+    other.live[:live] = record.live[:live]
+    at = 0
+    for row in record.live[:live]:
+        first, count = record.places[row, FIRST], record.places[row, COUNT]
+        other.pieces[at : at + count] = record.pieces[first : first + count]
+        other.places[row, FIRST], other.places[row, COUNT] = at, count
+        at += count
+    other.used[:] = record.used
+    other.used[PIECES] = at
+
+
+@kernel
+def has_room(record: Record, most_pieces: int) -> bool:
+    """Returns whether one more row with a command of so many pieces fits."""
+    used = record.used
+    return bool(
+        used[ROWS] < len(record.live)
+        and used[PIECES] + used[LONGEST] + most_pieces <= len(record.pieces)
+    )
+
+
+@kernel
+def way_of(record: Record, row: int) -> Way:
+    """Returns what a row drives from its last command on, and until that takes effect."""
+    first = record.places[row, FIRST]
+    pieces = record.pieces[first : first + record.places[row, COUNT]]
+    return Way(pieces, record.traits[row, LENGTH], record.traits[row, MERGE])
+
+
+@kernel
+def note_entry(
+    record: Record, length_m: float, merge_s: float, pieces: FloatArray, zone_end_m: float
+) -> int:
+    """Notes a vehicle that enters on ``pieces``; returns its row."""
+    row = record.used[ROWS]
+    record.traits[row, LENGTH] = length_m
+    _write(record, row, record.used[PIECES], pieces, merge_s, zone_end_m)
+    record.live[record.used[LIVE]] = row
+    record.used[LIVE] += 1
+    record.used[ROWS] += 1
+    return int(row)
+
+
+@kernel
+def note_command(
+    record: Record, row: int, merge_s: float, pieces: FloatArray, now_s: float, zone_end_m: float
+) -> None:
+    """Notes at ``now_s`` that a row follows ``pieces`` from their first time on.
+
+    Until then it drives what it was told before, which is kept in front of them.
+    """
+    start = record.used[PIECES]
+    first, count = record.places[row, FIRST], record.places[row, COUNT]
+    kept = 0
+    for k in range(first, first + count):
+        begins_s = record.pieces[k, 0]
+        ends_s = record.pieces[k + 1, 0] if k + 1 < first + count else math.inf
+        if ends_s > now_s and begins_s < pieces[0, 0]:
+            record.pieces[start + kept] = record.pieces[k]
+            kept += 1
+    record.places[row, FIRST] = start
+    _write(record, row, start + kept, pieces, merge_s, zone_end_m)
+
+
+@kernel
+def _write(
+    record: Record, row: int, at: int, pieces: FloatArray, merge_s: float, zone_end_m: float
+) -> None:
+    """Writes pieces at a place; the row's pieces begin at ``used[PIECES]``."""
+    start, end = record.used[PIECES], at + len(pieces)
+    record.pieces[at:end] = pieces
+    record.places[row, FIRST], record.places[row, COUNT] = start, end - start
+    record.traits[row, MERGE] = merge_s
+    record.traits[row, EXIT] = passes_s(record.pieces[start:end], zone_end_m)
+    record.used[PIECES] = end
+    record.used[LONGEST] = max(record.used[LONGEST], end - start)
+
+
+@kernel
+def forget_exited(record: Record, time_s: float) -> None:
+    """Takes rows off the live list that have left the zone by ``time_s``."""
+    kept = 0
+    for k in range(record.used[LIVE]):
+        if record.traits[record.live[k], EXIT] > time_s:
+            record.live[kept] = record.live[k]
+            kept += 1
+    record.used[LIVE] = kept

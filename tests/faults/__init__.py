@@ -1,0 +1,1 @@
+"""Faults put into coramp by hand, one at a time, and who catches each."""
