@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -11,6 +12,7 @@ import coramp
 from coramp.audit.audit import as_data, audit
 from coramp.audit.verdicts import CONFIRMED, CONTRADICTED, UNCHECKED
 from coramp.errors import CorampError
+from coramp.messages.reading import _order_of
 from coramp.strategies.registry import strategies
 from tests.edges import invoke
 
@@ -108,7 +110,7 @@ class Run:
         frame = self.changed(row, "of_s", of_s).with_row_index()
         here = pl.int_range(pl.len()) == row
         frame = frame.with_columns(time_s=pl.when(here).then(time_s).otherwise("time_s"))
-        frame = frame.sort("time_s", maintain_order=True)
+        frame = frame[np.argsort(_order_of(frame), kind="stable")]
         return frame.drop("index"), frame["index"].to_list().index(row)
 
     def without(self, row):
@@ -166,7 +168,7 @@ def test_another_time_on_a_message_that_stays_in_place_is_named(kept, tmp_path, 
     row = kept.middle(kind)
     time_s = (round(kept.frame["time_s"][row] / STEP_S) + steps) * STEP_S
     told = rows_named(kept, kept.changed(row, "time_s", pl.lit(time_s)), tmp_path / "r")
-    assert row in told or f"row {row} " in str(told), told
+    assert f"row {row} " in told if isinstance(told, str) else row in told
 
 
 def test_two_messages_that_changed_places_are_refused(kept, tmp_path):
@@ -187,7 +189,7 @@ def test_reports_of_one_time_that_changed_places_are_refused(kept, tmp_path):
     )["index"].to_list()
     order = list(range(kept.frame.height))
     order[beside[0]], order[beside[1]] = beside[1], beside[0]
-    with pytest.raises(CorampError, match=f"row {beside[0]} .*comes before earlier messages"):
+    with pytest.raises(CorampError, match=f"row {beside[1]} .*comes after a later message"):
         kept.audited(kept.frame[order], tmp_path / "r")
 
 
@@ -264,7 +266,7 @@ def test_reports_with_a_deviation_are_judged_at_five_of_it(kept, tmp_path, std_m
         ("max_decel_mps2", None),
         ("interventions", 7),
         ("plan_error_m", 0.04),
-        ("unserved", "none"),
+        ("unserved", 1),
     ],
 )
 def test_a_figure_that_is_not_so_is_named(kept, tmp_path, name, value):
@@ -328,14 +330,3 @@ def test_messages_need_a_folder():
     assert done.errors == [
         "Error: --keep-messages: there is no folder to keep them in; give --out DIR"
     ]
-
-
-@pytest.mark.parametrize("key", ["engine", "seed", "specification"])
-def test_a_run_json_that_lacks_something_is_refused(kept, tmp_path, key):
-    shutil.copytree(kept.folder, tmp_path / "r")
-    path = tmp_path / "r" / "run.json"
-    content = json.loads(path.read_text())
-    del content[key]
-    path.write_text(json.dumps(content))
-    with pytest.raises(CorampError, match=f"{key}: is not there"):
-        audit(tmp_path / "r")

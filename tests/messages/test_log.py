@@ -179,13 +179,13 @@ def test_a_message_before_its_time_is_refused(tmp_path):
 def test_a_message_before_its_vehicle_asked_is_refused(tmp_path):
     frame = log_frame()
     line = refusal(frame[[1, 0, *range(2, frame.height)]], tmp_path)
-    assert line.startswith("row 0 (0.5 s, m1, entry): comes before earlier messages")
+    assert line.startswith("row 1 (0.5 s, m1, request): comes after a later message")
 
 
 def test_reports_of_one_time_stand_by_vehicle(tmp_path):
     frame = log_frame()
     line = refusal(frame[[*range(8), 9, 8, 10]], tmp_path)
-    assert line.startswith("row 8 (1.0 s, r1, report): comes before earlier messages")
+    assert line.startswith("row 9 (1.0 s, m1, report): comes after a later message")
 
 
 def test_a_message_before_its_vehicles_request_is_refused(tmp_path):

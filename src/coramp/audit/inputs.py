@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
-from coramp.errors import CorampError
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.log import COMMAND, ENTRY, STREAMS
 from coramp.messages.reading import MessageLog, read_log
 from coramp.records.run import MESSAGES, RunRecords
-from coramp.records.run_folder import MARK, read_run
+from coramp.records.run_folder import read_run
 from coramp.scenarios.model import Scenario
 
 
@@ -53,29 +51,13 @@ def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     the log has messages of vehicles that never asked to enter.
     """
     run = read_run(folder)
-    scenario = _scenario_of(folder, run)
+    scenario = run.scenario
     known = set(run.vehicles["vehicle_id"].to_list())
     path = folder / f"{MESSAGES}.parquet"
     log = read_log(path, scenario.control.step_s, known, put_in_order)
     askers = _askers(log)
     rows = log.of_kind(ENTRY, COMMAND)[: 0 if len(log.strangers) else None]
     return Inputs(folder, run, scenario, log, askers, _orders(log, askers, rows), rows)
-
-
-def _scenario_of(folder: Path, run: RunRecords) -> Scenario:
-    content, needed = run.content, ("strategy", "engine", "seed", "specification", "summary")
-    if lacking := [name for name in needed if name not in content]:
-        raise CorampError(f"{folder / MARK}: {lacking[0]}: is not there; run again")
-    if content["engine"] not in ("sumo", "exact") or not isinstance(content["seed"], int):
-        raise CorampError(f"{folder / MARK}: engine or seed cannot be; run again")
-    try:
-        return run.scenario
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise CorampError(
-            f"{folder / MARK}: specification.{place}: {first['msg']}; run again"
-        ) from None
 
 
 def _askers(log: MessageLog) -> Askers:

@@ -221,8 +221,9 @@ def _check_order(path: Path, frame: pl.DataFrame, keys: IntArray) -> None:
         return
     row = int(back[0])
     told = "comes before earlier messages"
-    rest = np.delete(keys[max(0, row - 1) : row + 3], min(row, 1))
-    if (rest[1:] < rest[:-1]).any():  # not the former of the two is out of place, but the latter
+    around = keys[max(0, row - 1) : row + 3]
+    rest = np.delete(around, min(row, 1) + 1)
+    if not (rest[1:] < rest[:-1]).any():  # not the former of the two is out of place, or either
         row, told = row + 1, "comes after a later message"
     others = np.delete(keys, row)
     alone = bool((others[1:] >= others[:-1]).all())
