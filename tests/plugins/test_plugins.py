@@ -20,6 +20,7 @@ from coramp.strategies.base import Decision, DriveWithAcceleration, FollowTrajec
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.parameters import parameter
 from coramp.testing import check_strategy
+from coramp.worlds.exact.engine import run_exact
 
 STUDY = """
 name = "mixed"
@@ -192,6 +193,31 @@ def test_a_mistake_fails_its_own_runs_only(mistake, told, tmp_path, quick_guard)
         assert told in error
         assert "\n" not in error
     assert study.runs.filter(status="ok")["strategy"].to_list() == ["mainline-priority"] * 2
+
+
+@dataclass(frozen=True)
+class Writing:
+    """Plans as mainline priority does, on stations that it has moved in the view itself."""
+
+    name: ClassVar[str] = "writing"
+    summary: ClassVar[str] = "writes into the view"
+    cooperative: ClassVar[bool] = True
+    part: str = "fleet"
+
+    def decide(self, view, memory):
+        if self.part == "packed_rules":
+            view.packed_rules[0] += 1.0
+        else:
+            getattr(view, self.part).pieces[:, 1] += 0.25
+        return MainlinePriority().decide(view, memory)
+
+
+@pytest.mark.parametrize("part", ["fleet", "acknowledged", "packed_rules"])
+def test_one_that_writes_into_the_view_is_named_and_moves_nobody(part):
+    moved = coramp.run("paper", engine="exact", mainline_veh_h=1300, ramp_veh_h=600, horizon_s=60.0)
+    strategy = Guarded(Writing(part))
+    with pytest.raises(CorampError, match=r"strategy writing: at .* it writes into view\."):
+        run_exact(moved.scenario, strategy, 1)
 
 
 def test_a_strategy_that_wakes_itself_without_end_is_stopped():

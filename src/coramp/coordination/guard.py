@@ -1,6 +1,7 @@
 """Holds a strategy that is not coramp's own to the interface: what it may answer, and how long."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -24,7 +25,7 @@ from coramp.strategies.base import (
 )
 from coramp.strategies.registry import OURS, origin_of, strategy_named
 from coramp.strategies.situation import RUNGS
-from coramp.vehicles.fleet import MAX_CHANGED
+from coramp.vehicles.fleet import MAX_CHANGED, Fleet
 
 LONGEST_DECISION_S = 10.0
 """Wall time after which a decision counts as one that never comes; compiling does not count."""
@@ -59,8 +60,8 @@ class Guarded:
         """Returns what the strategy decides; raises CorampError where that cannot be used."""
         self._at_once = self._at_once + 1 if view.time_s == self._time_s else 0
         self._time_s = view.time_s
-        decision, problem = self._asked(view, memory)
-        problem = problem or _wrong_with(decision, view)
+        decision, problem = self._asked(shown := _copied(view), memory)
+        problem = problem or _written_into(shown, view) or _wrong_with(decision, view)
         if self._at_once > MOST_AT_ONCE:
             problem = "wakes itself without end"
         if problem or decision is None:
@@ -77,6 +78,26 @@ class Guarded:
             raise
         except BaseException as error:  # noqa: BLE001 - it may raise anything, or exit
             return None, _told(error)
+
+
+def _copied(view: View) -> View:
+    """Returns the view with arrays of its own: what is written into them reaches nobody."""
+    fleet = Fleet._make(array.copy() for array in view.fleet)
+    same = view.acknowledged is view.fleet
+    acknowledged = fleet if same else Fleet._make(a.copy() for a in view.acknowledged)
+    packed_rules = view.packed_rules.copy()
+    return replace(view, fleet=fleet, acknowledged=acknowledged, packed_rules=packed_rules)
+
+
+def _written_into(shown: View, view: View) -> str:
+    """Says into which part of a view the strategy has written, or nothing."""
+    for name in ("fleet", "acknowledged"):
+        pairs = zip(getattr(shown, name), getattr(view, name), strict=True)
+        if not all(np.array_equal(mine, given, equal_nan=True) for mine, given in pairs):
+            return f"writes into view.{name}; allowed is to read it"
+    if not np.array_equal(shown.packed_rules, view.packed_rules):
+        return "writes into view.packed_rules; allowed is to read it"
+    return ""
 
 
 def strategy_to_run(name: str, settings: Mapping[str, Any] | None = None) -> Decider:
