@@ -12,7 +12,7 @@ from coramp.motion.driving import hold_then_merge
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
-from tests.core import fleet_of, pieces
+from tests.mathematics import fleet_of, pieces
 from tests.situations import named
 
 RULES = load_scenario("paper").rules()

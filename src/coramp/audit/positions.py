@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from coramp._kernel import FloatArray, IntArray, kernel
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.audit.orders import Motion, Orders, passes_s, place_in, under_way
 
 NEAR_THE_END_M = 0.3
@@ -60,13 +60,14 @@ def due_reports(
     return found
 
 
-def expected_comparisons(
+def expected_in_sumo(
     orders: Orders, zone_end_m: float, step_s: float, end_step: int
-) -> IntArray:
-    """Returns who is compared with its plan when, shape (n, 2): vehicle and step, as driven.
+) -> tuple[IntArray, IntArray]:
+    """Returns who reports that an order begins, and who is compared with its plan, and when.
 
-    At the step in which it changes lanes, and at the last one before it is 0.2 m from the end of
-    the zone, as long as the order for that is in force.
+    Both of shape (n, 2): vehicle and step. The comparisons are at the step in which a vehicle
+    changes lanes, and at the last one before it is 0.2 m from the end of the zone, as long as the
+    order for that is in force. An order that begins later than that is not reported.
     """
     starts = np.rint(orders.pieces[orders.first[:-1], 0] / step_s)
     until = np.full(len(starts), math.inf)
@@ -81,11 +82,12 @@ def expected_comparisons(
         ]
     )
     lasts = np.ceil(exits_s / step_s - ON_GRID) - 1.0
-    here = np.isfinite(merges) & (merges - 1.0 >= starts) & (merges < until)
-    there = np.isfinite(lasts) & (lasts >= starts) & (lasts < until)
-    found = [
-        np.column_stack([orders.vehicle[chosen], steps[chosen].astype(np.int64)])
-        for chosen, steps in ((here, np.where(here, merges, 0)), (there, np.where(there, lasts, 0)))
-    ]
-    both = np.concatenate(found)
-    return np.unique(both[both[:, 1] <= end_step], axis=0)
+    merged = _chosen(orders, merges, (merges - 1.0 >= starts) & (merges < until), end_step)
+    left = _chosen(orders, lasts, (lasts >= starts) & (lasts < until), end_step)
+    begun = _chosen(orders, starts, (lasts >= starts) & (starts < until), end_step)
+    return begun, np.unique(np.concatenate([merged, left]), axis=0)
+
+
+def _chosen(orders: Orders, steps: FloatArray, chosen: BoolArray, end_step: int) -> IntArray:
+    chosen = chosen & (np.abs(steps) <= end_step)
+    return np.column_stack([orders.vehicle[chosen], steps[chosen].astype(np.int64)])
