@@ -174,7 +174,8 @@ def _not_driven_on(inputs: Inputs) -> list[Finding]:
         log.numbers("station_m")[rows],
         log.numbers("speed_mps")[rows],
     )
-    wrong = ~(np.abs(off) <= (DRIVEN_ON_M, DRIVEN_ON_MPS)).all(axis=1)
+    exactly = log.numbers("std_m")[rows] == 0.0
+    wrong = exactly & ~(np.abs(off) <= (DRIVEN_ON_M, DRIVEN_ON_MPS)).all(axis=1)
     found += zip(rows[wrong].tolist(), off[wrong, 0].tolist(), strict=True)
     text = "is {:+.6f} m off, or not as fast as, what the vehicle's reports before it lead to"
     return [finding(log, row, COMMITMENT, text.format(metres)) for row, metres in sorted(found)]
