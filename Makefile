@@ -1,4 +1,4 @@
-# make demo | test | lint | bench | docs | clean; everything lives in .venv of this checkout.
+# make demo | test | coverage | lint | wheel | bench | docs | clean; everything lives in .venv of this checkout.
 SHELL := /bin/sh
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,12 +9,14 @@ USABLE := import ensurepip, sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
 	$$p -c '$(USABLE)' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help demo test lint bench docs clean
+.PHONY: help demo test coverage lint wheel bench docs clean
 
 help:
 	@echo "make demo   install, run the paper's study with three seeds, print its tables, write its report"
 	@echo "make test   run all tests"
+	@echo "make coverage  run all tests and show which branches they take"
 	@echo "make lint   check style, types and layers"
+	@echo "make wheel  build sdist and wheel, and run the wheel with each Python that is claimed and here"
 	@echo "make bench  measure speed, as ratios"
 	@echo "make docs   build the docs site into out/site"
 	@echo "make clean  remove the environment and all results under out/"
@@ -35,6 +37,12 @@ demo: $(INSTALLED)
 
 test: $(INSTALLED)
 	$(BIN)/pytest -n auto --dist loadfile
+
+coverage: $(INSTALLED)
+	$(BIN)/pytest -n auto --dist loadfile --cov --cov-report=term --cov-report=html:out/coverage
+
+wheel: $(INSTALLED)
+	$(BIN)/python -m tests.wheel
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -33,7 +33,7 @@ def test_a_strict_target_moves_delay_from_the_mainline_to_the_ramp(metered, free
 
 def test_nobody_collides_and_nobody_brakes_as_if_the_signal_fell_from_the_sky(metered):
     assert metered.summary["collisions"] == 0
-    assert metered.summary["min_margin_m"] > 0.0
+    assert metered.summary["min_margin_equation"] != 1  # drivers do not know of Eq. 15 and 16
     assert metered.summary["max_decel_mps2"] < 6.0  # drivers' noise alone makes 5.4
 
 

@@ -161,6 +161,8 @@ def _examine_command(
     merge_s = change.merge_s[k]
     before = way_of(record, change.rows[k])
     code = _examine_form(pieces, merge_s)
+    if code == ACCEPTED and len(before.pieces) == 0:  # it has left, and what it drove is forgotten
+        code = LEAVES_ITS_PATH
     if code == ACCEPTED:
         station_m, speed_mps, _ = state_at(before.pieces, pieces[0, 0])
         code = _examine_start(pieces, earliest_s, pieces[0, 0], station_m, speed_mps)

@@ -1,0 +1,1 @@
+"""What users install: sdist and wheel are built, and the wheel is run in empty environments."""
