@@ -7,6 +7,7 @@ import pytest
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.demand.arrivals import arrivals_of
+from coramp.messages.feed import RequestFeed
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.outcomes import cap_step_of
@@ -32,7 +33,7 @@ def decision_times_ms(strategy, mainline, ramp, seeds):
         coordinator = Timed(
             strategy_named(strategy)(),
             scenario.rules(),
-            arrivals_of(scenario, seed),
+            RequestFeed(arrivals_of(scenario, seed)),
             scenario.fastest_mainline_entry_mps,
         )
         coordinator.expect_arrivals()

@@ -9,6 +9,7 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import MAINLINE, driven_pieces
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
+from coramp.messages.feed import RequestFeed
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
 
@@ -79,7 +80,7 @@ def loop(scenario, arrivals, strategy, last_s=400.0):
     if isinstance(strategy, str):
         strategy = strategy_named(strategy)()
     coordinator = Coordinator(
-        strategy, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+        strategy, scenario.rules(), RequestFeed(arrivals), scenario.fastest_mainline_entry_mps
     )
     coordinator.expect_arrivals()
     coordinator.run(round(last_s / STEP_S))

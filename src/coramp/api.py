@@ -146,13 +146,15 @@ def run(
     out: str | Path | None = None,
     keep_sumo: bool = False,
     gui: bool = False,
+    keep_messages: bool = False,
     notice: Callable[[str], None] | None = None,
 ) -> RunResult:
     """Runs a scenario once and returns its records; writes them to ``out`` if that is given.
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
-    run (default: fair). ``notice`` is told beforehand where demand is above the lane's limit,
-    and afterwards who is unserved.
+    run (default: fair). ``keep_messages`` keeps what the coordinator was told and commanded, for
+    ``coramp audit``. ``notice`` is told beforehand where demand is above the lane's limit, and
+    afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
     >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
@@ -176,9 +178,10 @@ def run(
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if out is None:
-        return _executed(spec, SumoOptions(gui=gui), notice)
+        return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages), notice)
     with staged_folder(Path(out), not_replaceable) as stage:
-        result = _executed(spec, SumoOptions(stage / SUMO if keep_sumo else None, gui), notice)
+        options = SumoOptions(stage / SUMO if keep_sumo else None, gui, keep_messages)
+        result = _executed(spec, options, notice)
         write_run(stage, result)
     return result
 

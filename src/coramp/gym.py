@@ -19,6 +19,7 @@ from coramp.demand.arrivals import arrivals_of
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.errors import CorampError
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, packed, unpacked
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import (
@@ -191,7 +192,10 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._interventions = 0
         self._strategy = _Others(self._new_others(), self._everyone)
         self.loop = Coordinator(
-            self._strategy, self._rules, self.arrivals, self._scenario.fastest_mainline_entry_mps
+            self._strategy,
+            self._rules,
+            RequestFeed(self.arrivals),
+            self._scenario.fastest_mainline_entry_mps,
         )
         self.loop.expect_arrivals()
         first = 0 if self._everyone else round(WARM_UP_S / self._step_s)
@@ -246,8 +250,10 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     def _ended(self) -> bool:
         if len(self._seen.rows):
             return False
-        left = self.loop.waiting() if self._everyone else []
-        return not any(self.arrivals[number].on_ramp for number in left)
+        if not self._everyone:
+            return True
+        entered = set(self.loop.entered()[0].tolist())
+        return not any(a.on_ramp for k, a in enumerate(self.arrivals) if k not in entered)
 
     def _info(self) -> dict[str, Any]:
         return {

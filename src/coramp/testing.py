@@ -8,6 +8,7 @@ import numpy as np
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.guard import Guarded
 from coramp.demand.arrivals import arrivals_of
+from coramp.messages.feed import RequestFeed
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import (
@@ -86,7 +87,7 @@ def _check(watched: Twice, scenario: Scenario, seed: int) -> None:
     coordinator = Coordinator(
         Guarded(watched),
         scenario.rules(),
-        arrivals_of(scenario, seed),
+        RequestFeed(arrivals_of(scenario, seed)),
         scenario.fastest_mainline_entry_mps,
     )
     coordinator.expect_arrivals()

@@ -7,6 +7,7 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.examination import Examiner
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import ACCEL, MAX_PIECES
+from coramp.messages.feed import RequestFeed
 from coramp.motion.driving import hold_then_merge
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
@@ -21,7 +22,9 @@ LAST_STEP = 1200
 def run_with(comfort_mps2, *arrivals):
     """Runs arrivals (stream, time, speed) past a checker that allows less than planners use."""
     listed = [Arrival("", s == "r", round(t / 0.1), v, 5.0) for s, t, v in arrivals]
-    loop = Coordinator(strategy_named("mainline-priority")(), RULES, named(listed), 20.0)
+    loop = Coordinator(
+        strategy_named("mainline-priority")(), RULES, RequestFeed(named(listed)), 20.0
+    )
     loop._examiner = Examiner(loop._examiner.bounds._replace(comfort_mps2=comfort_mps2))
     loop.expect_arrivals()
     loop.run(LAST_STEP)

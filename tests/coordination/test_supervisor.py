@@ -12,6 +12,7 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import RAMP
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.feed import RequestFeed
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import Decision, DriveWithAcceleration
 from tests.situations import driven, least_margin_m, loop, named, situations
@@ -30,7 +31,7 @@ class Silent:
 def loop_of(*arrivals):
     """A loop at 5 s; arrivals are stream (m or r), time in s and speed."""
     listed = [Arrival("", s == "r", round(t / 0.1), v, 5.0) for s, t, v in arrivals]
-    coordinator = Coordinator(Silent(), RULES, named(listed), 20.0)
+    coordinator = Coordinator(Silent(), RULES, RequestFeed(named(listed)), 20.0)
     coordinator.expect_arrivals()
     coordinator.run(round(NOW_S / 0.1))
     return coordinator
@@ -161,7 +162,10 @@ def test_how_much_room_the_book_has_changes_nothing(situation, seed):
     histories = []
     for room in (1, 5000):
         coordinator = Coordinator(
-            Wild(Random(seed)), scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+            Wild(Random(seed)),
+            scenario.rules(),
+            RequestFeed(arrivals),
+            scenario.fastest_mainline_entry_mps,
         )
         coordinator.ledger.make_room(room)
         coordinator.expect_arrivals()

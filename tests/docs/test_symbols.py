@@ -9,6 +9,7 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
+from coramp.messages.log import MESSAGES
 from coramp.records import schemas
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.model import Scenario
@@ -38,6 +39,7 @@ FILES = {
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
     "streams.parquet": schemas.STREAMS,
+    "messages.parquet": MESSAGES,
 }
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}
 

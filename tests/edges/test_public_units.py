@@ -13,7 +13,8 @@ from tests.mathematics import mathematics
 MODULES = [
     *(module.__name__ for module in mathematics().values()),
     "coramp.strategies.base",
-    "coramp.coordination.plant",
+    "coramp.messages.commands",
+    "coramp.messages.events",
 ]
 UNITS = re.compile(r"_(m|s|mps|mps2|mps3|m2ps4|mlps|l|kg|rad|deg|veh_h)$")
 DIMENSIONLESS = {
@@ -88,7 +89,7 @@ def test_the_walk_finds_what_there_is():
     assert "coramp.equations.safe_distance.safe_distance_m" in names
     assert "coramp.road.rules.SafetyBudget" in names
     assert "coramp.strategies.base.View" in names
-    assert "coramp.coordination.plant.Arrival" in names
+    assert "coramp.messages.events.RequestToEnter" in names
     hints = typing.get_type_hints(dict(FUNCTIONS)["coramp.kinematics.trajectory.time_to_cover"])
     assert _without_unit({**hints, "speed": float}) == ["speed"]
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.guard import Guarded
 from coramp.errors import CorampError
+from coramp.messages.feed import RequestFeed
 from coramp.strategies.registry import register, strategies, strategy_named
 from coramp.testing import Twice, check_strategy
 from tests.situations import situations
@@ -20,7 +21,10 @@ def test_total_deterministic_finite_and_pure(name, situation):
     scenario, arrivals, _ = situation
     watched = Twice(strategy_named(name))
     coordinator = Coordinator(
-        Guarded(watched), scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+        Guarded(watched),
+        scenario.rules(),
+        RequestFeed(arrivals),
+        scenario.fastest_mainline_entry_mps,
     )
     coordinator.expect_arrivals()
     coordinator.run(2000)

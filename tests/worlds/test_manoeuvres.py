@@ -7,6 +7,7 @@ import pytest
 import coramp
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.plant import Arrival
+from coramp.messages.feed import RequestFeed
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.snapshots import Snapshot, load_snapshot
 from coramp.strategies.base import Decision, Memory, View
@@ -58,7 +59,7 @@ def first_view(snapshot: Snapshot, scenario: Scenario) -> View:
         Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.vehicle.length_m)
         for v in vehicles
     ]
-    coordinator = Coordinator(onlooker, scenario.rules(), arrivals, 20.0)
+    coordinator = Coordinator(onlooker, scenario.rules(), RequestFeed(arrivals), 20.0)
     for number, vehicle in enumerate(vehicles):
         assert coordinator.place(number, vehicle.station_m, 0)
     coordinator.decide_now(0)

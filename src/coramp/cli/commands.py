@@ -162,6 +162,9 @@ def run(
     horizon: Annotated[float | None, typer.Option(help="Seconds of arrivals.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the records.")] = None,
     keep_sumo: Annotated[bool, typer.Option(help="Keep SUMO's own files in OUT/sumo.")] = False,
+    keep_messages: Annotated[
+        bool, typer.Option(help="Keep what was told and commanded, for coramp audit.")
+    ] = False,
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
     json: Json = False,
 ) -> None:
@@ -176,6 +179,8 @@ def run(
     )
     from coramp.scenarios.toml_files import parse_overrides
 
+    if keep_messages and out is None:
+        raise CorampError("--keep-messages: there is no folder to keep them in; give --out DIR")
     tell_of_compiling()
     with working("running"):
         result = run_scenario(
@@ -190,6 +195,7 @@ def run(
             horizon_s=horizon,
             out=out,
             keep_sumo=keep_sumo,
+            keep_messages=keep_messages,
             gui=gui,
             notice=tell_of_demand,
         )
@@ -271,6 +277,30 @@ def study(
     _exit_if_broken(result.broken_promises)
     if failed:
         raise typer.Exit(WRONG)
+
+
+@app.command(epilog="Example: coramp audit out/r")
+def audit(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out --keep-messages.")
+    ],
+    json: Json = False,
+) -> None:
+    """Check a run by its messages: every decision, command, report and safety figure."""
+    from coramp.audit.audit import as_data
+    from coramp.audit.audit import audit as audited
+    from coramp.cli.console import print_audit, print_json, tell_of_compiling
+
+    tell_of_compiling()
+    result = audited(folder)
+    if json:
+        print_json(as_data(result))
+    else:
+        print_audit(result)
+    for found in result.contradictions:
+        print(f"Contradiction: {found.line}", file=sys.stderr)
+    if not result.holds:
+        raise typer.Exit(UNSAFE)
 
 
 @app.command(epilog="Example: coramp explain out/r r00012")

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table as RichTable
 
 from coramp.api import PlanResult, RunResult, StudyResult
+from coramp.audit.verdicts import Audit
 from coramp.explain.decision import Quantity
 from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
@@ -188,6 +190,14 @@ def print_run(result: RunResult, out: Path | None) -> None:
     print_table(run_table(result.summary))
     if out is not None:
         print(f"Records are in {out}; coramp explain {out} VEHICLE tells one vehicle's story.")
+
+
+def print_audit(result: Audit) -> None:
+    """Prints what an audit confirmed, and what not, one line a claim."""
+    rows = tuple((check.claim, check.verdict, check.how) for check in result.checks)
+    counts = Counter(check.verdict for check in result.checks)
+    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    print_table(Table(f"{result.folder}: {told}", ("claim", "verdict", "how"), rows))
 
 
 def quantity_table(title: str, quantities: list[Quantity]) -> Table:

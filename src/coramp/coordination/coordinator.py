@@ -21,6 +21,7 @@ from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
     DONE,
     FULL,
+    HEARD,
     NEVER,
     REFUSED,
     WAITS,
@@ -29,14 +30,17 @@ from coramp.coordination.gate import (
     entries_of,
     first_step_from,
     gate_for,
+    next_step,
     open_gate,
     waiting_at,
+    with_feed,
 )
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.newcomers import Newcomers
-from coramp.coordination.plant import Arrival, Plant
+from coramp.coordination.plant import Plant
 from coramp.coordination.supervisor import drive_safely
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
 from coramp.road.rules import Rules, packed
 from coramp.strategies.base import (
@@ -80,8 +84,9 @@ ASKED, DUE = range(2)
 
 
 class Coordinator:
-    """Runs one strategy over given arrivals.
+    """Runs one strategy over the requests to enter that a world feeds.
 
+    The feed is the world's; a request is read when its step has come, and may be there earlier.
     Without a plant nobody carries the vehicles: the commitments are all there is.
     ``interventions`` counts what the strategy commanded and the checker refused.
     """
@@ -90,24 +95,24 @@ class Coordinator:
         self,
         strategy: Decider,
         rules: Rules,
-        arrivals: Sequence[Arrival],
+        feed: RequestFeed,
         fastest_entry_mps: float,
         plant: Plant | None = None,
     ) -> None:
         road = rules.road
-        self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(arrivals))
+        self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(feed))
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
         self.interventions = 0
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
-        self._examiner = Examiner(bounds_of(rules), len(arrivals))
-        self._arrivals = arrivals
+        self._examiner = Examiner(bounds_of(rules), len(feed))
+        self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
         slowest_mps = policy.slowest_share * road.mainline_speed_mps
-        self._gate = gate_for(arrivals, policy.asked, slowest_mps)
+        self._gate = gate_for(feed, policy.asked, slowest_mps)
         self._fastest_entry_mps = fastest_entry_mps
         self._newcomers = Newcomers(fastest_entry_mps, rules)
         self._plant = plant
@@ -120,7 +125,7 @@ class Coordinator:
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
     def expect_arrivals(self) -> None:
-        """Lets every arrival come at its step, and starts the strategy's own clock, if any."""
+        """Lets every request be heard at its step, and starts the strategy's own clock, if any."""
         open_gate(self._gate)
         if self._period_steps:
             self._wake(self._period_steps, PERIOD)
@@ -131,7 +136,7 @@ class Coordinator:
             next_wake = self._wakes[0][0] if self._wakes else NEVER
             self._admit(min(last_step, next_wake))
             if not self._wakes or self._wakes[0][0] > last_step:
-                if min(self._gate.try_step) > last_step:
+                if next_step(self._gate) > last_step:
                     return
                 continue
             step = self._wakes[0][0]
@@ -141,6 +146,7 @@ class Coordinator:
 
     def _admit(self, last_step: int) -> None:
         """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
+        self._gate = with_feed(self._gate, self._feed)
         while True:
             stop = admit_until(
                 self.ledger.book,
@@ -183,7 +189,7 @@ class Coordinator:
         columns = (gate.row_arrival[new].tolist(), gate.row_step[new].tolist())
         for row, (arrival, step) in enumerate(zip(*columns, strict=True), new.start):
             self._plant.advance(step)
-            self._plant.enter(row, self._arrivals[arrival], step)
+            self._plant.enter(row, self._feed[arrival], step)
             self._plant.follow(row, ledger.trajectory(row), ledger.merge_time_s(row))
 
     def entered(self) -> tuple[IntArray, IntArray]:
@@ -199,8 +205,8 @@ class Coordinator:
             self._decide((row,), step)
 
     def waiting(self) -> list[int]:
-        """Returns the arrivals (by number) that have not entered."""
-        return sorted(set(range(len(self._arrivals))) - set(self.entered()[0].tolist()))
+        """Returns the requests (by number) that have been heard and have not entered."""
+        return sorted(set(range(int(self._gate.feed[HEARD]))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
         if self._wakes[0][:2] == (step, PERIOD):
@@ -245,7 +251,7 @@ class Coordinator:
         heapq.heappush(self._wakes, (step, row, kind))
 
     def place(self, number: int, station_m: float, step: int) -> bool:
-        """Puts an arrival on the road, harmonised from there; False where that is not safe."""
+        """Puts who asks to enter on the road, from that station; False where that is not safe."""
         self.ledger.make_room()
         self._examiner.make_room()
         code = enter(

@@ -1,9 +1,8 @@
-"""The gate: arrivals enter as soon as it is safe, each stream in its order.
+"""The gate: vehicles that ask to enter do so as soon as it is safe, each stream in its order.
 
 One kernel lets in everyone up to the next decision, so that a run asks Python only for decisions.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,13 +24,15 @@ from coramp.coordination.book import (
     ways_of,
 )
 from coramp.coordination.book import write_commitment as write
-from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import MAX_PIECES
+from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
 
 NEVER = 1 << 60
 WAITS = -1
+HEARD, OFFERED, OPEN = range(3)
+"""Places in ``Gate.feed``."""
 DONE, FULL, REFUSED = range(3)
 """Why ``admit_until`` came back: nobody else is due, the book is full, the checker refused."""
 ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
@@ -39,15 +40,18 @@ ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
 
 
 class Gate(NamedTuple):
-    """Arrivals, who is next on each stream (0 mainline, 1 ramp), and who entered when.
+    """Requests to enter, who is next on each stream (0 mainline, 1 ramp), and who entered when.
 
-    ``of_stream[s]`` lists the ``vehicles[s]`` arrivals of a stream; ``next_place[s]`` is the place
-    of the first that has not entered, and ``try_step[s]`` when that tries. ``row_*`` have an entry
-    a row of the book: its arrival, the step at which it entered, the one at which it is planned.
-    ``asks`` is True where the strategy is asked about each vehicle as it enters. A mainline vehicle
-    waits outside rather than brake below ``slowest_mps`` as it enters. Both have one entry.
-    ``refused[s]`` is whom of a stream the checker refused last and why, and how many commitments
-    and vehicles on the road there were then.
+    The first four fields are those of the world's feed; a request is read, and counted in
+    ``feed[HEARD]``, only when its step has come. ``of_stream[s]`` lists the ``vehicles[s]``
+    requests of a stream that have been heard; ``next_place[s]`` is the place of the first that has
+    not entered, and ``try_step[s]`` when that tries. ``row_*`` have an entry a row of the book: its
+    request, the step at which it entered, the one at which it is planned. ``asks`` is True where
+    the strategy is asked about each vehicle as it enters. A mainline vehicle waits outside rather
+    than brake below ``slowest_mps`` as it enters. Both have one entry. ``feed`` is how many
+    requests have been heard, how many the feed has, and whether the gate is open. ``refused[s]`` is
+    whom of a stream the checker refused last and why, and how many commitments and vehicles on the
+    road there were then.
     """
 
     step: IntArray
@@ -63,6 +67,7 @@ class Gate(NamedTuple):
     row_due_step: IntArray
     asks: BoolArray
     slowest_mps: FloatArray
+    feed: IntArray
     refused: IntArray
 
 
@@ -75,28 +80,40 @@ class Stop(NamedTuple):
     code: int
 
 
-def gate_for(arrivals: Sequence[Arrival], asks: bool = False, slowest_mps: float = 0.0) -> Gate:
+def gate_for(feed: RequestFeed, asks: bool = False, slowest_mps: float = 0.0) -> Gate:
     """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
-    on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
-    streams = [np.flatnonzero(~on_ramp), np.flatnonzero(on_ramp)]
-    of_stream = np.zeros((2, len(arrivals)), np.int64)
-    for stream, numbers in enumerate(streams):
-        of_stream[stream, : len(numbers)] = numbers
+    room = len(feed.arrays.step)
     return Gate(
-        np.array([arrival.step for arrival in arrivals], np.int64),
-        on_ramp,
-        np.array([arrival.speed_mps for arrival in arrivals], np.float64),
-        np.array([arrival.length_m for arrival in arrivals], np.float64),
-        of_stream,
-        np.array([len(numbers) for numbers in streams], np.int64),
+        *feed.arrays,
+        np.zeros((2, room), np.int64),
+        np.zeros(2, np.int64),
         np.zeros(2, np.int64),
         np.full(2, NEVER),
-        np.zeros(len(arrivals), np.int64),
-        np.zeros(len(arrivals), np.int64),
-        np.full(len(arrivals), NEVER),
+        np.zeros(room, np.int64),
+        np.zeros(room, np.int64),
+        np.full(room, NEVER),
         np.array([asks]),
         np.array([slowest_mps]),
+        np.array([0, len(feed), 0], np.int64),
         np.full((2, 4), -1),
+    )
+
+
+def with_feed(gate: Gate, feed: RequestFeed) -> Gate:
+    """Returns the gate with all that the feed has by now."""
+    gate.feed[OFFERED] = len(feed)
+    old, room = gate.of_stream.shape[1], len(feed.arrays.step)
+    if room == old:
+        return gate
+    of_stream = np.zeros((2, room), np.int64)
+    of_stream[:, :old] = gate.of_stream
+    more = room - old
+    return gate._replace(
+        **feed.arrays._asdict(),
+        of_stream=of_stream,
+        row_arrival=np.append(gate.row_arrival, np.zeros(more, np.int64)),
+        row_step=np.append(gate.row_step, np.zeros(more, np.int64)),
+        row_due_step=np.append(gate.row_due_step, np.full(more, NEVER)),
     )
 
 
@@ -141,9 +158,32 @@ def _waiting_at(
 
 @kernel
 def open_gate(gate: Gate) -> None:
-    """Lets the first arrival of each stream try when it is due."""
-    for stream in range(2):
-        _next_tries(gate, stream, 0)
+    """Has requests heard from now on, each when its step has come."""
+    gate.feed[OPEN] = 1
+
+
+@kernel
+def next_step(gate: Gate) -> int:
+    """Returns when somebody tries to enter, or the next request is due."""
+    step = min(gate.try_step[0], gate.try_step[1])
+    heard = gate.feed[HEARD]
+    if gate.feed[OPEN] == 1 and heard < gate.feed[OFFERED]:
+        step = min(step, gate.step[heard])
+    return int(step)
+
+
+@kernel
+def _hear(gate: Gate, step: int) -> None:
+    """Reads the requests that are due by ``step``."""
+    while gate.feed[HEARD] < gate.feed[OFFERED] and gate.step[gate.feed[HEARD]] <= step:
+        request = gate.feed[HEARD]
+        stream = 1 if gate.on_ramp[request] else 0
+        place = gate.vehicles[stream]
+        gate.of_stream[stream, place] = request
+        gate.vehicles[stream] += 1
+        gate.feed[HEARD] += 1
+        if gate.next_place[stream] == place:
+            _next_tries(gate, stream, 0)
 
 
 @kernel
@@ -172,10 +212,11 @@ def admit_until(
     """
     rules = unpacked(packed_rules)
     while True:
-        step = min(gate.try_step[0], gate.try_step[1])
+        step = next_step(gate)
         strike_exited(book, min(step, last_step) * rules.control.step_s)
         if step > last_step:
             return Stop(DONE, step, -1, ACCEPTED)
+        _hear(gate, step)
         for stream in range(2):
             while gate.try_step[stream] <= step:
                 if is_full(

@@ -12,6 +12,7 @@ import polars as pl
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
+from coramp.messages.log import as_frame
 from coramp.metrics.fitting import fitted_pieces
 from coramp.metrics.lane_figures import bound_figures, braking_figures
 from coramp.metrics.lane_uses import lane_uses
@@ -75,6 +76,7 @@ class RunTables:
             "decisions": self.decisions,
             "positions": self.positions,
             "violations": self.violations,
+            "messages": self.messages,
         }
         return {name: frame for name, frame in every.items() if frame is not None}
 
@@ -110,6 +112,12 @@ class RunTables:
             return None
         fitted = fitted_pieces(outcome.pieces.first, outcome.pieces.rows, outcome.lane)
         return trajectories_table(outcome.passages.vehicle_id, *fitted)
+
+    @cached_property
+    def messages(self) -> pl.DataFrame | None:
+        """One row a message, where they were to be kept."""
+        told = self.outcome.told
+        return None if told is None else as_frame(told, self.scenario.control.step_s)
 
     @cached_property
     def violations(self) -> pl.DataFrame:

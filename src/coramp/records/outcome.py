@@ -6,6 +6,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord, Refusal
+from coramp.messages.log import Told
 
 LANES = ("ramp", "acceleration", "mainline")
 """Names of the lane codes of ``coordination.driven``."""
@@ -54,7 +55,7 @@ class Outcome:
     simulator made of it; for its own drivers both are its steps. ``driven_lane`` has a code for
     each driven piece where the simulator's positions were read. ``end_s`` is when the run ended or
     was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
-    places in ``passages``.
+    places in ``passages``. ``told`` are the messages, where they were to be kept.
     """
 
     cooperative: bool
@@ -69,6 +70,7 @@ class Outcome:
     interventions: int = 0
     driven_lane: IntArray | None = None
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    told: Told | None = None
 
     @property
     def until_s(self) -> FloatArray:

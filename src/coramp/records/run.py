@@ -11,6 +11,8 @@ from coramp.scenarios.model import Scenario
 
 TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
+MESSAGES = "messages"
+"""The log of messages lies beside them where it was to be kept; only the audit reads it back."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,8 @@ class RunRecords:
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
     trajectories and decisions only of cooperative runs, and positions of the others. Violations
-    and positions are None where a coramp that kept none wrote the run.
+    and positions are None where a coramp that kept none wrote the run, messages where they were
+    not to be kept, and in a run that was read.
     """
 
     content: Row
@@ -30,11 +33,12 @@ class RunRecords:
     decisions: pl.DataFrame | None = None
     positions: pl.DataFrame | None = None
     violations: pl.DataFrame | None = None
+    messages: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:
         """The tables that there are, by name."""
-        every = {name: getattr(self, name) for name in TABLES}
+        every = {name: getattr(self, name) for name in (*TABLES, MESSAGES)}
         return {name: frame for name, frame in every.items() if frame is not None}
 
     @cached_property

@@ -7,7 +7,7 @@ import polars as pl
 
 from coramp.errors import CorampError
 from coramp.records.files import read_json, write_json, write_parquet
-from coramp.records.run import TABLES, RunRecords
+from coramp.records.run import MESSAGES, TABLES, RunRecords
 from coramp.records.schemas import RESULT_VERSION, Row
 from coramp.records.stored_checks import SCHEMAS, checked_content, checked_frame
 from coramp.records.unfinished import is_unfinished
@@ -20,7 +20,7 @@ SUMO_COPIES = ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml"
 SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS = "net.net.xml", "command.txt", "loops.add.xml"
 SUMO_FILES = (*SUMO_COPIES, SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS)
 """What it may hold."""
-OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in TABLES)})
+OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in (*TABLES, MESSAGES))})
 NAMED_AT_MOST = 3
 """So many foreign files are named in an error."""
 

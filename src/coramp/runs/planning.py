@@ -11,6 +11,7 @@ from coramp.coordination.driven import driven_pieces
 from coramp.coordination.guard import strategy_to_run
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
+from coramp.messages.feed import RequestFeed
 from coramp.metrics.tables import decisions_table
 from coramp.records.outcome import LANES
 from coramp.records.schemas import TRAJECTORIES
@@ -52,7 +53,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         for v in vehicles
     ]
     coordinator = Coordinator(
-        chosen, scenario.rules(), arrivals, scenario.fastest_mainline_entry_mps
+        chosen, scenario.rules(), RequestFeed(arrivals), scenario.fastest_mainline_entry_mps
     )
     for number, vehicle in enumerate(vehicles):
         if not coordinator.place(number, vehicle.station_m, 0):

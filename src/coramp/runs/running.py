@@ -185,7 +185,7 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     name = spec.strategy
     strategy = Timed(strategy_to_run(name, spec.scenario.strategy.get(name)))
     if spec.engine == "exact":
-        outcome = run_exact(spec.scenario, strategy, spec.seed)
+        outcome = run_exact(spec.scenario, strategy, spec.seed, options.keep_messages)
     elif strategy_named(name).cooperative:
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:

@@ -26,7 +26,11 @@ def step_after_last_exit(coordinator: Coordinator, step_s: float) -> int:
     ledger = coordinator.ledger
     if coordinator.waiting():
         return NEVER
-    last_s = float(np.max(ledger.book.exit_s[: len(ledger)], initial=0.0))
+    return step_after(float(np.max(ledger.book.exit_s[: len(ledger)], initial=0.0)), step_s)
+
+
+def step_after(last_s: float, step_s: float) -> int:
+    """Returns a step at which all is over whose last exit is at ``last_s``, maybe infinity."""
     return NEVER if math.isinf(last_s) else math.ceil(last_s / step_s) + 2
 
 

@@ -62,11 +62,18 @@ class Driven:
 
 
 class CooperativePlant:
-    """Carries cooperative vehicles through a SUMO session."""
+    """Carries cooperative vehicles through a SUMO session.
+
+    ``driven`` is a piece each: row, time, station, speed and acceleration, measured there but for
+    those whose places are in ``carried_on``. ``compared`` are row, step, station and speed where a
+    vehicle was compared with its plan besides.
+    """
 
     def __init__(self, session: Session, lane_starts_m: dict[str, float], rules: Rules) -> None:
         self.vehicles: list[Driven] = []
         self.driven: list[tuple[int, float, float, float, float]] = []
+        self.carried_on: list[int] = []
+        self.compared: list[tuple[int, int, float, float]] = []
         self._session = session
         self._lane_starts_m = lane_starts_m
         self._step_s = rules.control.step_s
@@ -137,7 +144,9 @@ class CooperativePlant:
             self._session.act_now(vehicle.vehicle_id)
         else:
             planned_m, _ = station_and_speed(following.pieces, step * self._step_s)
-            self._measure(vehicle, planned_m)
+            error_m = self._measure(vehicle, planned_m)
+            now_mps = vehicle.speed_at(step, self._step_s)
+            self.compared.append((following.row, step, planned_m + error_m, now_mps))
 
     def _command_speed(self, step: int, vehicle: Driven, following: Following) -> None:
         if not vehicle.taken_over:
@@ -174,6 +183,7 @@ class CooperativePlant:
         self.driven.append((row, step * self._step_s, station_m, speed_mps, accel_mps2))
         if steps == 0 and accel_mps2 != 0.0:
             then_m = station_m + 0.5 * (speed_mps + target_mps) * change_s
+            self.carried_on.append(len(self.driven))
             self.driven.append((row, (step + 1) * self._step_s, then_m, target_mps, 0.0))
         vehicle.speed_mps, vehicle.accel_mps2 = speed_mps, accel_mps2
         vehicle.since, vehicle.steps = step, max(1.0, steps)

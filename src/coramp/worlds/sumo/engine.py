@@ -17,6 +17,9 @@ from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
+from coramp.messages.channel import Channel
+from coramp.messages.feed import RequestFeed
+from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.outcome import Outcome, Pieces
 from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
@@ -26,6 +29,7 @@ from coramp.worlds.outcomes import (
     cap_step_of,
     cooperative_outcome,
     passages_of,
+    step_after,
     step_after_last_exit,
 )
 from coramp.worlds.sumo.cooperative import CooperativePlant
@@ -39,7 +43,9 @@ from coramp.worlds.sumo.network import (
     road_plan,
 )
 from coramp.worlds.sumo.session import Session
+from coramp.worlds.sumo.telling import positions_in_sumo
 from coramp.worlds.sumo.traits import traits_of
+from coramp.worlds.telling import reports_of_samples, together
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
@@ -65,10 +71,11 @@ class Samples:
 
 @dataclass(frozen=True)
 class SumoOptions:
-    """How a run is watched: files kept in a folder, a window."""
+    """How a run is watched: files kept in a folder, a window, messages kept in the outcome."""
 
     keep_in: Path | None = None
     gui: bool = False
+    keep_messages: bool = False
 
 
 def run_cooperative(
@@ -94,14 +101,22 @@ def _run_cooperative(
     arrivals = arrivals_of(scenario, seed)
     plan = road_plan(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
-        files = _Files(Path(name), scenario, plan, seed, options, ballistic=True, sampled=sampled)
+        keep = options.keep_messages
+        files = _Files(
+            Path(name), scenario, plan, seed, options, ballistic=True, sampled=sampled or keep
+        )
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
         with Session(
             [*files.options(), "--insertion-checks", "none"], rules.control.step_s, options.gui
         ) as session:
             plant = CooperativePlant(session, plan.lane_starts_m(), rules)
+            channel = Channel(plant)
             coordinator = Coordinator(
-                strategy, rules, arrivals, scenario.fastest_mainline_entry_mps, plant
+                strategy,
+                rules,
+                RequestFeed(arrivals),
+                scenario.fastest_mainline_entry_mps,
+                channel if keep else plant,
             )
             cap_step = cap_step_of(scenario)
             coordinator.expect_arrivals()
@@ -114,7 +129,7 @@ def _run_cooperative(
             files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=True))
         files.keep()
         collisions = files.collisions()
-        samples = files.samples(arrivals) if sampled else None
+        samples = files.samples(arrivals) if sampled or keep else None
     outcome = cooperative_outcome(
         coordinator,
         arrivals,
@@ -124,18 +139,27 @@ def _run_cooperative(
         _driven(plant, coordinator.entered()[0], len(arrivals)),
         collisions,
     )
-    return outcome if samples is None else _as_seen(outcome, samples)
+    if samples is None:
+        return outcome
+    if keep:
+        positions = together(
+            (
+                reports_of_samples(*_motion_of(samples), rules.control.step_s),
+                positions_in_sumo(plant, outcome.vehicle_of_row, rules.control.step_s),
+            )
+        )
+        told = Told(arrivals, channel.commands, positions, (), end_step)
+        outcome = replace(outcome, told=told)
+    return _as_seen(outcome, samples) if sampled else outcome
+
+
+def _motion_of(samples: Samples) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    return samples.vehicle, samples.time_s, samples.station_m, samples.speed_mps
 
 
 def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:
     """Returns the outcome with what vehicles drove as SUMO's positions have it, at each step."""
-    first, rows = pieces_of_samples(
-        samples.vehicle,
-        samples.time_s,
-        samples.station_m,
-        samples.speed_mps,
-        len(outcome.passages),
-    )
+    first, rows = pieces_of_samples(*_motion_of(samples), len(outcome.passages))
     lane = np.where(samples.on_mainline, MAINLINE, RAMP)
     return replace(outcome, driven=Pieces(first, rows), driven_lane=lane)
 
@@ -186,6 +210,11 @@ def run_uncontrolled(
     )
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
+    told = None
+    if options.keep_messages:
+        last_s = float(np.max(exit_s, initial=0.0)) if left else math.inf
+        end_step = min(cap_step, step_after(last_s, step_s))
+        told = _told_of_drivers(arrivals, samples, meter, step_s, end_step)
     return Outcome(
         cooperative=False,
         passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
@@ -194,7 +223,24 @@ def run_uncontrolled(
         driven=Pieces(first, rows),
         end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
         collisions=collisions,
+        told=told,
     )
+
+
+def _told_of_drivers(
+    arrivals: Sequence[Arrival],
+    samples: Samples,
+    meter: Meter | None,
+    step_s: float,
+    end_step: int,
+) -> Told:
+    """Returns the messages of a run of drivers, who are reported and never commanded."""
+    positions = reports_of_samples(*_motion_of(samples), step_s)
+    if meter is None:
+        return Told(arrivals, [], positions, [], end_step)
+    signals = [signal for signal in meter.signals if signal.step <= end_step]
+    readings = [r for r in meter.readings if round(r.time_s / step_s) <= end_step]
+    return Told(arrivals, signals, positions, readings, end_step)
 
 
 def _passing_times(

@@ -2,12 +2,11 @@
 
 import math
 
-import numpy as np
-
-from coramp.coordination.ledger import Ledger
-from coramp.road.rules import packed
+from coramp.coordination.metered import MeteredRoad
+from coramp.messages.commands import SetSignal
+from coramp.messages.events import DetectorReading
 from coramp.scenarios.model import Scenario
-from coramp.strategies.base import Decider, Detectors, Memory, Reports, SetRampSignal, View
+from coramp.strategies.base import Decider
 from coramp.worlds.sumo.session import GREEN, RED, YELLOW, Session
 
 MAINLINE_LOOP, QUEUE_LOOP = "mainline", "queue"
@@ -45,19 +44,19 @@ def queue_loop_m(scenario: Scenario) -> float:
 
 
 class Meter:
-    """Asks a strategy once a period, with what the loops tell, and sets the signal."""
+    """Reads the loops once a period, tells the strategy, and sets the signal as it commands.
+
+    ``readings`` and ``signals`` are what it was told and what it commanded.
+    """
 
     def __init__(self, session: Session, scenario: Scenario, strategy: Decider) -> None:
         self._session = session
-        self._strategy = strategy
         self._step_s = scenario.control.step_s
-        self._memory: Memory = None
-        rules = scenario.rules()
-        self._rules, self._packed = rules, packed(rules)
-        self._fastest_mps = scenario.fastest_mainline_entry_mps
-        self._nobody = Ledger(rules.road.mainline_speed_mps, rules.road.mainline_end_m).fleet
+        self._loop = MeteredRoad(strategy, scenario.rules(), scenario.fastest_mainline_entry_mps)
         self._red_s = math.inf
         self._on_ramp: set[str] = set()
+        self.readings: list[DetectorReading] = []
+        self.signals: list[SetSignal] = []
         session.set_signal(SIGNAL, RAMP_LANE, GREEN)
 
     def run(self, first_step: int, last_step: int) -> None:
@@ -68,38 +67,18 @@ class Meter:
             mainline += self._session.loop_occupancy(MAINLINE_LOOP)
             queue += self._session.loop_occupancy(QUEUE_LOOP)
         steps = last_step - first_step
-        self._decide(last_step * self._step_s, mainline / steps, queue / steps)
-
-    def _decide(self, time_s: float, mainline_occupancy: float, queue_occupancy: float) -> None:
-        view = self._view(time_s, mainline_occupancy, queue_occupancy)
-        decision = self._strategy.decide(view, self._memory)
-        self._memory = decision.memory
-        for command in decision.commands:
-            if isinstance(command, SetRampSignal):
-                self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if command.green else YELLOW)
-                self._red_s = math.inf if command.green else time_s + YELLOW_S
-        if time_s >= self._red_s:
-            self._session.set_signal(SIGNAL, RAMP_LANE, RED)
-            self._red_s = math.inf
-
-    def _view(self, time_s: float, mainline_occupancy: float, queue_occupancy: float) -> View:
         waiting = self._session.vehicles_on(RAMP_LANE)
         passed, self._on_ramp = len(self._on_ramp - waiting), waiting
-        seen = Detectors(mainline_occupancy, queue_occupancy, passed)
-        return View(
-            time_s,
-            (),
-            self._nobody,
-            self._nobody,
-            nobody_reports,
-            self._fastest_mps,
-            self._rules,
-            self._packed,
-            seen,
-        )
+        time_s = last_step * self._step_s
+        self._decide(DetectorReading(time_s, mainline / steps, queue / steps, passed))
 
-
-def nobody_reports() -> Reports:
-    """Returns the reports of no vehicles."""
-    nothing = np.empty(0)
-    return Reports(nothing, nothing, nothing, nothing)
+    def _decide(self, reading: DetectorReading) -> None:
+        signals = self._loop.handle(reading)
+        self.readings.append(reading)
+        self.signals += signals
+        for signal in signals:
+            self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if signal.green else YELLOW)
+            self._red_s = math.inf if signal.green else reading.time_s + YELLOW_S
+        if reading.time_s >= self._red_s:
+            self._session.set_signal(SIGNAL, RAMP_LANE, RED)
+            self._red_s = math.inf

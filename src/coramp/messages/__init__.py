@@ -1,0 +1,1 @@
+"""What world and coordinator tell each other, the channel between them, and the log of it."""

@@ -1,0 +1,63 @@
+"""The channel between world and coordinator, perfect for now: at once, and nothing is lost."""
+
+from typing import Protocol
+
+from coramp._kernel import FloatArray
+from coramp.messages.commands import Command, Enter, Follow
+from coramp.messages.events import RequestToEnter
+
+
+class Plant(Protocol):
+    """Carries vehicles. Steps count the control clock; step k is at ``k * step_s``."""
+
+    def advance(self, step: int) -> None:
+        """Lets time pass up to ``step``; what is commanded next takes effect from there."""
+        ...
+
+    def enter(self, row: int, arrival: RequestToEnter, step: int) -> None:
+        """Puts a vehicle with its front at the start of its zone, at its entry speed."""
+        ...
+
+    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+        """Makes a vehicle follow the pieces from their first time on; merge at that time."""
+        ...
+
+
+class Channel:
+    """Hands commands on to a world, if there is one, and keeps them in their order.
+
+    Each arrives in the step in which it is given, and is acknowledged in it.
+    """
+
+    def __init__(self, world: Plant | None = None) -> None:
+        self.commands: list[Command] = []
+        self._world = world
+        self._names: list[str] = []
+        self._entering = -1
+        self._step = 0
+
+    def advance(self, step: int) -> None:
+        """Lets time pass up to ``step``."""
+        self._step = step
+        if self._world is not None:
+            self._world.advance(step)
+
+    def enter(self, row: int, arrival: RequestToEnter, step: int) -> None:
+        """Lets a vehicle enter; its first pieces follow."""
+        self._names.append(arrival.vehicle_id)
+        self._entering = row
+        if self._world is not None:
+            self._world.enter(row, arrival, step)
+
+    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+        """Carries a command, which for a vehicle that enters is its entry."""
+        kind = Enter if row == self._entering else Follow
+        self._entering = -1
+        self.commands.append(kind(self._names[row], self._step, pieces.copy(), merge_time_s))
+        if self._world is not None:
+            self._world.follow(row, pieces, merge_time_s)
+
+    def taken(self) -> tuple[Command, ...]:
+        """Returns what has been commanded since this was last asked."""
+        commands, self.commands = tuple(self.commands), []
+        return commands

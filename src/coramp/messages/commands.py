@@ -1,0 +1,39 @@
+"""What the coordinator tells the world."""
+
+from dataclasses import dataclass
+
+from coramp._kernel import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Enter:
+    """Enter at ``step`` and follow these pieces (``kinematics.trajectory``) from there."""
+
+    vehicle_id: str
+    step: int
+    pieces: FloatArray
+    merge_time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """Follow these pieces from their first time on; commanded at ``step``.
+
+    ``merge_time_s`` is minus infinity for mainline vehicles, infinity while no merge is committed.
+    """
+
+    vehicle_id: str
+    step: int
+    pieces: FloatArray
+    merge_time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetSignal:
+    """Show green, or red, at the ramp's stop line."""
+
+    step: int
+    green: bool
+
+
+Command = Enter | Follow | SetSignal

@@ -1,0 +1,65 @@
+"""What a world tells the coordinator. Step k of the control clock is at ``k * step_s``."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class RequestToEnter(NamedTuple):
+    """A vehicle at the start of its zone asks to enter, from ``step`` on, at this speed."""
+
+    vehicle_id: str
+    on_ramp: bool
+    step: int
+    speed_mps: float
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A vehicle tells where it is. ``std_m`` is the standard deviation of its station.
+
+    ``measured_s`` is when it was there; a report that is told later than that has been carried on
+    from then. ``accel_mps2`` is what it drives with until its next such report, None in the reports
+    of once a second.
+    """
+
+    vehicle_id: str
+    time_s: float
+    station_m: float
+    speed_mps: float
+    std_m: float = 0.0
+    accel_mps2: float | None = None
+    measured_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """A road sensor saw a vehicle, which need not be connected; deviations are standard ones."""
+
+    time_s: float
+    station_m: float
+    speed_mps: float
+    station_std_m: float
+    speed_std_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledgement:
+    """A vehicle has the command that was given at ``commanded_s``."""
+
+    vehicle_id: str
+    time_s: float
+    commanded_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorReading:
+    """What the road's loops tell of the time since the last reading (``strategies.base``)."""
+
+    time_s: float
+    mainline_occupancy: float
+    queue_occupancy: float
+    passed_veh: int
+
+
+Event = RequestToEnter | Report | Detection | Acknowledgement | DetectorReading

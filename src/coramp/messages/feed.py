@@ -1,0 +1,66 @@
+"""Requests to enter, as a world hands them over: in order of time, and as many as it has so far."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.messages.events import RequestToEnter
+
+
+class Requests(NamedTuple):
+    """Requests as kernels read them; there may be more entries than the feed has requests."""
+
+    step: IntArray
+    on_ramp: BoolArray
+    speed_mps: FloatArray
+    length_m: FloatArray
+
+
+class RequestFeed:
+    """Belongs to the world. Whoever reads it reads no request before its step.
+
+    A simulator that knows all requests beforehand offers all of them at once; a live service adds
+    each as it comes (``append``), at any time before its step has been handled.
+    """
+
+    def __init__(self, requests: Iterable[RequestToEnter] = ()) -> None:
+        self._list = list(requests)
+        listed = self._list
+        self.arrays = Requests(
+            np.array([request.step for request in listed], np.int64),
+            np.array([request.on_ramp for request in listed], np.bool_),
+            np.array([request.speed_mps for request in listed], np.float64),
+            np.array([request.length_m for request in listed], np.float64),
+        )
+        if (np.diff(self.arrays.step) < 0).any():
+            raise ValueError("requests must come in order of time")
+
+    def __len__(self) -> int:
+        return len(self._list)
+
+    def __getitem__(self, number: int) -> RequestToEnter:
+        return self._list[number]
+
+    def append(self, request: RequestToEnter) -> None:
+        """Offers one more request; raises ValueError where it cannot be."""
+        numbers = (request.speed_mps, request.length_m)
+        if not all(math.isfinite(number) and number > 0.0 for number in numbers):
+            raise ValueError(f"{request.vehicle_id}: speed and length must be positive and finite")
+        if request.step < (self._list[-1].step if self._list else 0):
+            raise ValueError(f"{request.vehicle_id}: comes before the request before it")
+        place = len(self._list)
+        if place == len(self.arrays.step):
+            self.arrays = Requests(*(_longer(column) for column in self.arrays))
+        arrays = self.arrays
+        arrays.step[place], arrays.on_ramp[place] = request.step, request.on_ramp
+        arrays.speed_mps[place], arrays.length_m[place] = numbers
+        self._list.append(request)
+
+
+def _longer(column: Any) -> Any:
+    longer = np.zeros(2 * len(column) + 16, column.dtype)
+    longer[: len(column)] = column
+    return longer
