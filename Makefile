@@ -9,7 +9,7 @@ USABLE := import ensurepip, sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
 	$$p -c '$(USABLE)' >/dev/null 2>&1 && echo $$p && break; done)
 
-.PHONY: help demo test coverage lint wheel bench docs clean
+.PHONY: help demo test coverage lint wheel bench faults rows docs clean
 
 help:
 	@echo "make demo   install, run the paper's study with three seeds, print its tables, write its report"
@@ -18,6 +18,8 @@ help:
 	@echo "make lint   check style, types and layers"
 	@echo "make wheel  build sdist and wheel, and run the wheel with each Python that is claimed and here"
 	@echo "make bench  measure speed, as ratios"
+	@echo "make faults put faults in by hand, one at a time, and tell who caught each"
+	@echo "make rows   compare kept rows of runs with what the code gives now"
 	@echo "make docs   build the docs site into out/site"
 	@echo "make clean  remove the environment and all results under out/"
 
@@ -49,6 +51,12 @@ lint: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+faults: $(INSTALLED)
+	$(BIN)/python -m tests.faults
+
+rows: $(INSTALLED)
+	$(BIN)/python -m tests.kept_rows
 
 bench: $(INSTALLED)
 	$(BIN)/pytest benchmarks --benchmark-columns=min,median,rounds --benchmark-sort=fullname -s

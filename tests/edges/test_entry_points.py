@@ -49,7 +49,7 @@ def test_completion_in_a_notebook_finds_the_api():
         ("coramp study sens", ["sensitivity"]),
         ("coramp plan ex", ["example"]),
         ("coramp studio express", ["expressway"]),
-        ("coramp run paper --keep", ["--keep-sumo"]),
+        ("coramp run paper --keep", ["--keep-messages", "--keep-sumo"]),
     ],
 )
 def test_a_shell_completes(line, words):

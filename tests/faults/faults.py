@@ -1,4 +1,4 @@
-"""The faults: what is changed where, and the runs and tests that are to show it."""
+"""The faults: what is changed where, and the run that is driven with each."""
 
 from typing import NamedTuple
 
@@ -12,25 +12,44 @@ class Edit(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A fault: its name, its edits, the run that is driven with it, and tests that may see it."""
+    """A fault: its name, its edits, and the run (options of ``coramp run``) that is to show it.
+
+    ``test`` is for a fault that hardly any run shows: it is that of a worked number.
+    """
 
     name: str
     edits: tuple[Edit, ...]
-    run: tuple[str, ...] = ()
-    tests: tuple[str, ...] = ()
+    run: tuple[str, ...]
+    test: str = ""
 
 
-BUSY = ("--mainline", "1800", "--ramp", "700", "--horizon", "60", "--seed", "3")
-SLOTS = ("--strategy", "slots", *BUSY)
-PLATOON = (
-    "--strategy",
-    "virtual-platoon",
-    "--mainline",
-    "1500",
-    "--ramp",
-    "500",
-    "--horizon",
-    "25",
+EXACT = ("paper", "--engine", "exact")
+BUSY = (*EXACT, "--mainline", "2000", "--ramp", "900", "--horizon", "90", "--seed", "3")
+STEERED = (
+    *(*EXACT, "-s", "virtual-platoon", "--mainline", "1500", "--ramp", "500"),
+    *("--horizon", "40"),
+)
+DELAYED = (
+    *(*EXACT, "--mainline", "900", "--ramp", "2500", "--horizon", "120", "--seed", "2"),
+    *("--set", "control.actuation_delay_s=3.0", "--set", "ramp.entry_speed_mps=[1.0, 12.0]"),
+)
+
+BOOK, TRAJECTORY = "coordination/book.py", "kinematics/trajectory.py"
+SEPARATIONS = "metrics/separations.py"
+START_BY_THE_COMMAND = Edit(
+    "checker/checker.py",
+    "_examine_start(pieces, earliest_s, pieces[0, 0], station_m, speed_mps)",
+    "_examine_start(pieces, earliest_s, pieces[0, 0], pieces[0, 1], pieces[0, 2])",
+)
+AHEAD = Edit(
+    TRAJECTORY,
+    "    out[0, STATION] = station_m\n",
+    "    out[0, STATION] = station_m + 3.0\n",
+)
+HELD_AHEAD = Edit(
+    "motion/driving.py",
+    "    n = begin(out, from_s, station_m, speed_mps)\n    return drive_within_limit",
+    "    n = begin(out, from_s, station_m + 0.2, speed_mps)\n    return drive_within_limit",
 )
 
 FAULTS = (
@@ -38,31 +57,90 @@ FAULTS = (
         "exit times 700 m too early",
         (
             Edit(
-                "coordination/book.py",
-                "time_at_station(way, zone_end_m)",
-                "time_at_station(way, zone_end_m - 700.0)",
+                BOOK,
+                "book.exit_s[row] = time_at_station(way, zone_end_m)",
+                "book.exit_s[row] = time_at_station(way, zone_end_m - 700.0)",
             ),
         ),
-        ("--mainline", "2400", "--ramp", "900", "--horizon", "90", "--seed", "3"),
+        BUSY,
     ),
+    Fault("plans begin 3 m ahead of where the vehicle is", (AHEAD,), BUSY),
     Fault(
-        "plans take over 3 m ahead of where the vehicle is",
+        "0.3 m added to each station that planners read",
         (
             Edit(
-                "motion/approach.py", "station_m, speed_mps, 0.0", "station_m + 3.0, speed_mps, 0.0"
+                TRAJECTORY,
+                "return pieces[k, STATION] + 0.5 * (pieces[k, SPEED] + speed_mps) * x",
+                "return pieces[k, STATION] + 0.3 + 0.5 * (pieces[k, SPEED] + speed_mps) * x",
             ),
         ),
         BUSY,
     ),
     Fault(
-        "0.3 m added to each station that planners read",
+        "plans begin 3 m ahead, and the checker takes the start from the command itself",
+        (START_BY_THE_COMMAND, AHEAD),
+        BUSY,
+    ),
+    Fault(
+        "steered vehicles jump 0.2 m, and the checker takes the start from the command itself",
+        (START_BY_THE_COMMAND, HELD_AHEAD),
+        STEERED,
+    ),
+    Fault(
+        "plans 5 mm too near, and violations count only below -0.01 m",
         (
+            Edit(SEPARATIONS, "EXACT_M = 1e-8", "EXACT_M = 0.01"),
             Edit(
-                "kinematics/trajectory.py",
-                "    return station_m, speed_mps\n",
-                "    return station_m + 0.3, speed_mps\n",
+                "scenarios/model.py",
+                "SafetyBudget(**self.safety.model_dump())",
+                'SafetyBudget(**{**self.safety.model_dump(), "execution_allowance_m": -0.005})',
             ),
         ),
+        BUSY,
+    ),
+    Fault(
+        "extremes of TTC and DRAC within pieces are left out",
+        (Edit(SEPARATIONS, "if opening_mps2 > 0.0:", "if opening_mps2 > 1e9:"),),
+        STEERED,
+        "tests/metrics/test_separations.py::test_the_smallest_ttc_may_lie_within_a_piece",
+    ),
+    Fault(
+        "ramp vehicles count on the mainline 0.5 s late",
+        (
+            Edit(
+                "metrics/lane_uses.py",
+                "np.where(passages.on_ramp, passages.merge_s, passages.entry_s)",
+                "np.where(passages.on_ramp, passages.merge_s + 0.5, passages.entry_s)",
+            ),
+        ),
+        STEERED,
+    ),
+    Fault(
+        "planners and checker both take half of the positioning error in Eq. 1",
+        (
+            Edit("checker/distances.py", "by_paper_m = 2.0 * bounds", "by_paper_m = 1.0 * bounds"),
+            Edit(
+                "equations/safe_distance.py",
+                "        2.0 * safety.positioning_error_m\n",
+                "        1.0 * safety.positioning_error_m\n",
+            ),
+        ),
+        (*BUSY, "--set", "safety.positioning_error_m=0.5"),
+    ),
+    Fault(
+        "newcomers reckon with commitments that act only after the delay",
+        (
+            Edit(
+                BOOK,
+                "return _as_fleet(book, book.way_first, book.way_count)",
+                "return fleet_of(book)",
+            ),
+        ),
+        DELAYED,
+    ),
+    Fault(
+        "the row says half of the largest severity",
+        (Edit("metrics/tables.py", '"max_severity": float(', '"max_severity": 0.5 * float('),),
         BUSY,
     ),
 )

@@ -277,3 +277,14 @@ def test_without_a_violation_the_margin_is_over_eq_1():
     assert found["safety_violations"] == 0
     assert found["min_margin_equation"] == 1
     assert found["min_merge_margin_m"] is None
+
+
+def test_the_smallest_ttc_may_lie_within_a_piece():
+    # gap 10 - 5 x + x^2, closing speed 5 - 2 x: 2 s at both ends, least where c^2 = 2 g,
+    # at x = (10 - sqrt(60)) / 4, and there TTC = c / 2
+    front = np.array([[0.0, 15.0, 20.0, 0.0]])
+    rear = np.array([[0.0, 0.0, 25.0, -2.0], [1.0, 24.0, 23.0, 0.0]])
+    ttc_s, _ = closing_extremes(front, 5.0, rear, 0.0, 1.0)
+    at_s = (10.0 - math.sqrt(60.0)) / 4.0
+    assert ttc_s == pytest.approx((5.0 - 2.0 * at_s) / 2.0)
+    assert ttc_s < 1.94

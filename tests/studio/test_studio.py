@@ -14,7 +14,7 @@ from axe_playwright_python.sync_playwright import Axe
 import coramp
 from coramp.cli.commands import main
 from coramp.errors import CorampError
-from coramp.report.page.shown import played
+from coramp.runs.running import recorded
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.studio.answers import Answers
 from coramp.studio.dials import studio_of
@@ -218,7 +218,7 @@ def test_a_run_that_is_under_way_is_run_once(monkeypatch):
     from coramp.studio import answers as module
 
     runs, studio, found = [], Answers(studio_of("paper")), []
-    monkeypatch.setattr(module, "played", lambda spec: runs.append(spec) or played(spec))
+    monkeypatch.setattr(module, "recorded", lambda spec: runs.append(spec) or recorded(spec))
     threads = [
         threading.Thread(target=lambda: found.append(told(studio, horizon=60, seed=9)))
         for _ in range(4)
