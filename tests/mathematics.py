@@ -145,7 +145,7 @@ def sampled_margins(front, front_length_m, rear, times_s, safety):
 
 
 def fleet_of(*vehicles, live=None):
-    """Commitments of ``(pieces, merge time, adjustable)``, 5 m long unless a length follows."""
+    """Commitments of ``(pieces, merge time)``, 5 m long unless a length follows."""
     rows = [vehicle[0] for vehicle in vehicles]
     counts = [len(row) for row in rows]
     ranges = [intercept_range_m(row, row[0, 0], 20.0) for row in rows]
@@ -153,10 +153,9 @@ def fleet_of(*vehicles, live=None):
         pieces=np.concatenate(rows),
         first_piece=np.cumsum([0, *counts[:-1]]),
         piece_count=np.array(counts),
-        length_m=np.array([vehicle[3] if len(vehicle) > 3 else 5.0 for vehicle in vehicles]),
+        length_m=np.array([vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]),
         merge_time_s=np.array([vehicle[1] for vehicle in vehicles]),
         lowest_m=np.array([low_m for low_m, _ in ranges]),
         highest_m=np.array([high_m for _, high_m in ranges]),
-        adjustable=np.array([vehicle[2] for vehicle in vehicles]),
         live=np.arange(len(rows)) if live is None else np.array(live),
     )

@@ -56,7 +56,7 @@ def test_a_held_acceleration_keeps_to_a_weak_one_on_the_lane():
     weak = RULES._replace(motion=RULES.motion._replace(ramp_acceleration_mps2=1.2))
     weak = weak._replace(motion=weak.motion._replace(free_acceleration_mps2=1.0))
     out = np.empty((MAX_PIECES, 4))
-    fleet = fleet_of((pieces(0.0, 20.0, 14.0), 12.0, True))
+    fleet = fleet_of((pieces(0.0, 20.0, 14.0), 12.0))
     n = hold_then_merge(fleet, 0, 1.5, 2.0, 1.0, weak, out)
     assert n > 1
     assert out[:n, ACCEL].max() == 1.2

@@ -28,8 +28,8 @@ STREAM = -math.inf
 THREE = (30.0, 20.0, 10.0)  # 5 m between bumpers, 4.85999988 m beyond the clearance
 
 
-def _stream(*stations_m, adjustable=True):
-    return fleet_of(*((pieces(0.0, s, 20.0), STREAM, adjustable) for s in stations_m))
+def _stream(*stations_m):
+    return fleet_of(*((pieces(0.0, s, 20.0), STREAM) for s in stations_m))
 
 
 def _moved_m(proposal, fleet, entry):
@@ -107,12 +107,12 @@ def test_shift_back_may_be_slower_than_one_ahead_is_fast(lasts_s, back_m, ahead_
 
 def test_shifts_back_one_upon_the_other_keep_the_lower_bound_together():
     # 7 m/s below v0 after 3 s, again at v0 after 6 s: a second one may take 3 m/s more, 9 m
-    once = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 3.0), (20.0, 3.0)]), STREAM, True))
+    once = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 3.0), (20.0, 3.0)]), STREAM))
     for shift_m, possible in ((-1.8, True), (-2.0, False)):  # 7/3 m/s2 leave 0.607: 1.82 m/s
         done = propose_shift(once, empty_proposal(), 0, 0.0, 0.0, 6.0, 3.0 * shift_m, SLOW)
         assert done == possible
     # over 20 s the accelerations would do: 10 m/s are what binds
-    gently = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 10.0), (20.0, 10.0)]), STREAM, True))
+    gently = fleet_of((pieces(0.0, 10.0, 20.0, [(13.0, 10.0), (20.0, 10.0)]), STREAM))
     for shift_m, possible in ((-29.9, True), (-30.1, False)):
         done = propose_shift(gently, empty_proposal(), 0, 0.0, 0.0, 20.0, shift_m, SLOW)
         assert done == possible
@@ -132,21 +132,16 @@ def test_cascade_back_may_be_slow_and_one_ahead_not_fast():
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_shifts_one_upon_the_other_keep_the_bounds_together(side):
     # 1.5 m/s off v0 after 3 s, again at v0 after 6 s: a second one may add 0.5 m/s
-    once = fleet_of(
-        (pieces(0.0, 10.0, 20.0, [(20.0 + side * 1.5, 3.0), (20.0, 3.0)]), STREAM, True)
-    )
+    once = fleet_of((pieces(0.0, 10.0, 20.0, [(20.0 + side * 1.5, 3.0), (20.0, 3.0)]), STREAM))
     assert _shift(once, 0, 0.0, 6.0, side * 1.4) is not None
     assert _shift(once, 0, 0.0, 6.0, side * 1.6) is None
     # 1.8 m/s2 within 1 s: 1.2 m/s2 more are too many, though the speeds would do
-    quick = fleet_of(
-        (pieces(0.0, 10.0, 20.0, [(20.0 + side * 1.8, 1.0), (20.0, 1.0)]), STREAM, True)
-    )
+    quick = fleet_of((pieces(0.0, 10.0, 20.0, [(20.0 + side * 1.8, 1.0), (20.0, 1.0)]), STREAM))
     assert _shift(quick, 0, 0.0, 0.6, side * 0.09) is not None  # 1 m/s2
     assert _shift(quick, 0, 0.0, 0.6, side * 0.108) is None
 
 
-def test_vehicle_that_is_bound_or_already_moved_is_not_shifted():
-    assert _shift(_stream(10.0, adjustable=False), 0, 0.0, 6.0, 1.0) is None
+def test_a_vehicle_that_is_already_moved_is_not_shifted():
     fleet = _stream(30.0, 10.0)
     proposal = _shift(fleet, 0, 0.0, 6.0, 1.0)
     assert not propose_shift(fleet, proposal, 0, 0.0, 0.0, 6.0, 1.0, RULES)
@@ -157,7 +152,7 @@ def test_vehicle_that_is_bound_or_already_moved_is_not_shifted():
 
 def test_vehicle_still_to_merge_moves_only_after_its_merge():
     merging = pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 2.0)])
-    fleet = fleet_of((merging, 12.0, True))
+    fleet = fleet_of((merging, 12.0))
     proposal = _shift(fleet, 0, 5.0, 16.0, 1.0)
     assert proposal.merge_time_s[0] == 12.0
     new = proposal.pieces[0, : proposal.piece_count[0]]
@@ -169,33 +164,31 @@ def test_vehicle_still_to_merge_moves_only_after_its_merge():
 
 
 def test_bounds_are_for_what_a_shift_adds_not_for_what_is_committed():
-    entering_fast = fleet_of((pieces(0.0, -300.0, 23.0, [(23.0, 1.0), (20.0, 2.0)]), STREAM, True))
+    entering_fast = fleet_of((pieces(0.0, -300.0, 23.0, [(23.0, 1.0), (20.0, 2.0)]), STREAM))
     assert _shift(entering_fast, 0, 5.0, 11.0, 1.0) is not None
-    entering_slowly = fleet_of(
-        (pieces(0.0, -300.0, 15.0, [(15.0, 1.0), (20.0, 5.0)]), STREAM, True)
-    )
+    entering_slowly = fleet_of((pieces(0.0, -300.0, 15.0, [(15.0, 1.0), (20.0, 5.0)]), STREAM))
     assert _shift(entering_slowly, 0, 7.0, 13.0, -1.0) is not None
-    merging = fleet_of((pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 0.8)]), 10.8, True))
+    merging = fleet_of((pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 0.8)]), 10.8))
     assert _shift(merging, 0, 5.0, 16.8, 1.0) is not None
 
 
 def test_window_that_ends_before_the_merge_moves_nobody():
     merging = pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 2.0)])
-    fleet = fleet_of((merging, 12.0, True))
+    fleet = fleet_of((merging, 12.0))
     assert _shift(fleet, 0, 5.0, 11.0, 1.0) is None
     assert _shift(fleet, 0, 5.0, 11.0, 0.5) is None
 
 
 def test_trajectory_too_long_to_be_moved_is_left():
     weaving = [(20.0 + 0.1 * (k % 2), 1.0) for k in range(MAX_PIECES - 4)]
-    fleet = fleet_of((pieces(0.0, -400.0, 20.0, weaving), STREAM, True))
+    fleet = fleet_of((pieces(0.0, -400.0, 20.0, weaving), STREAM))
     assert _shift(fleet, 0, 1.0, 7.0, 0.5) is None
-    shorter = fleet_of((pieces(0.0, -400.0, 20.0, weaving[:-1]), STREAM, True))
+    shorter = fleet_of((pieces(0.0, -400.0, 20.0, weaving[:-1]), STREAM))
     assert _shift(shorter, 0, 1.0, 7.0, 0.5) is not None
 
 
 def test_intercept_is_the_final_cruise_run_back():
-    fleet = fleet_of((pieces(2.0, 0.0, 16.0, [(20.0, 2.0)]), STREAM, True))
+    fleet = fleet_of((pieces(2.0, 0.0, 16.0, [(20.0, 2.0)]), STREAM))
     assert intercept_m(fleet, 0, RULES) == close(-44.0)  # 36 - 20 * 4
 
 
@@ -230,7 +223,7 @@ def test_cascade_ahead_ends_with_the_foremost():
 def test_cascade_ahead_with_a_time_gap_counts_the_time_there_is(merge_s, leader_m):
     # 0.1 m beyond 0.14000012 m and half a second at 20 m/s: 2 (0.5 * 2 / T - 0.1) + 1
     leader = pieces(0.0, 15.24000012, 20.0)
-    fleet = fleet_of((leader, STREAM, True), (pieces(0.0, 0.0, 20.0), merge_s, True))
+    fleet = fleet_of((leader, STREAM), (pieces(0.0, 0.0, 20.0), merge_s))
     proposal = empty_proposal()
     rules = with_safety(time_gap_s=0.5)
     assert push_ahead(fleet, proposal, np.array([0, 1]), 1, 0.0, 2.0, 8.0, 1.0, rules)
@@ -249,15 +242,6 @@ def test_cascade_back_moves_each_follower_by_what_is_missing():
     assert find_unsafe_pair(fleet, proposal, 0.0, RULES) == (-1, -1)
 
 
-@pytest.mark.parametrize(("push", "first"), [(push_ahead, 2), (push_back, 0)])
-def test_cascade_fails_with_a_vehicle_that_cannot_move(push, first):
-    fleet = _stream(*THREE)
-    fleet.adjustable[1] = False
-    order = np.array([0, 1, 2])
-    assert not push(fleet, empty_proposal(), order, first, 0.0, 0.0, 10.0, 6.0, RULES)
-    assert push(fleet, empty_proposal(), order, first, 0.0, 0.0, 10.0, 4.8, RULES)
-
-
 def test_vehicle_moved_without_its_leader_is_found_unsafe():
     fleet = _stream(*THREE)
     near = _shift(fleet, 2, 0.0, 10.0, 4.9)
@@ -269,7 +253,7 @@ def test_ramp_pair_that_is_far_apart_only_later_is_found_unsafe():
     # they overlap now, and are 100 m apart when the slower one merges
     slow = pieces(0.0, -100.0, 10.0, [(10.0, 10.0), (20.0, 5.0)])
     fast = pieces(0.0, -96.0, 20.0)
-    fleet = fleet_of((slow, math.inf, True), (fast, 5.0, True))
+    fleet = fleet_of((slow, math.inf), (fast, 5.0))
     proposal = empty_proposal()
     proposal.size[0], proposal.rows[0], proposal.merge_time_s[0] = 1, 0, 15.0
     proposal.piece_count[0] = len(slow)
@@ -291,7 +275,7 @@ def _random_fleet(rng):
         ways.append(pieces(0.0, rng.uniform(-400.0, 300.0), speeds_mps[0], stretches))
         merges_s.append(rng.choice([STREAM, STREAM, rng.uniform(1.0, 15.0), math.inf]))
         lengths_m.append(rng.uniform(4.0, 18.0))
-    return fleet_of(*zip(ways, merges_s, [True] * 6, lengths_m, strict=True))
+    return fleet_of(*zip(ways, merges_s, lengths_m, strict=True))
 
 
 def test_unsafe_pairs_are_found_though_far_ones_are_skipped():

@@ -32,11 +32,11 @@ def _proposed(proposal, entry=0):
 
 def test_next_behind_is_the_nearest_without_a_merge():
     fleet = fleet_of(
-        (stopping(-100.0, -1.0), UNDECIDED, True),
-        (stopping(-160.0, -13.0), UNDECIDED, True),
-        (stopping(-130.0, -7.0), UNDECIDED, True),
-        (pieces(0.0, -115.0, 16.0), 20.0, True),  # merges
-        (pieces(0.0, -115.0, 20.0), -math.inf, True),  # on the mainline
+        (stopping(-100.0, -1.0), UNDECIDED),
+        (stopping(-160.0, -13.0), UNDECIDED),
+        (stopping(-130.0, -7.0), UNDECIDED),
+        (pieces(0.0, -115.0, 16.0), 20.0),  # merges
+        (pieces(0.0, -115.0, 20.0), -math.inf),  # on the mainline
     )
     assert next_behind_on_ramp(fleet, 0, 0.0) == 2
     assert next_behind_on_ramp(fleet, 2, 0.0) == 1
@@ -45,7 +45,7 @@ def test_next_behind_is_the_nearest_without_a_merge():
 
 
 def test_lone_vehicle_goes_on_to_its_stop_without_braking_before():
-    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED))
     proposal = empty_proposal()
     assert propose_stop(fleet, proposal, 0, -10.0, 1.0, RULES)
     expected = [[1.0, -144.0, 16.0, 0.0], [6.175, -61.2, 16.0, -2.5], [12.575, -10.0, 0.0, 0.0]]
@@ -54,14 +54,14 @@ def test_lone_vehicle_goes_on_to_its_stop_without_braking_before():
 
 
 def test_stop_that_is_too_near_adds_nothing():
-    fleet = fleet_of((pieces(0.0, -60.0, 16.0), UNDECIDED, True))
+    fleet = fleet_of((pieces(0.0, -60.0, 16.0), UNDECIDED))
     proposal = empty_proposal()
     assert not propose_stop(fleet, proposal, 0, -10.0, 0.0, RULES)
     assert proposal.size[0] == 0
 
 
 def test_full_proposal_takes_no_stop():
-    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    fleet = fleet_of((pieces(0.0, -160.0, 16.0), UNDECIDED))
     proposal = empty_proposal()
     proposal.size[0] = MAX_CHANGED
     assert not propose_stop(fleet, proposal, 0, -10.0, 0.0, RULES)
@@ -85,7 +85,7 @@ def _brake_margin_m(leader, station_m, stop_m, steps):
 def test_brake_before_the_stop_is_the_shortest_that_keeps_the_distance(headway_m, leader_mps):
     leader = stopping(-120.0, -1.0, leader_mps)
     station_m, stop_m = -120.0 - headway_m, -6.2
-    fleet = fleet_of((leader, UNDECIDED, True), (pieces(0.0, station_m, 16.0), UNDECIDED, True))
+    fleet = fleet_of((leader, UNDECIDED), (pieces(0.0, station_m, 16.0), UNDECIDED))
     proposal = empty_proposal()
     if not propose_stop(fleet, proposal, 1, stop_m, 0.0, RULES):
         assert _brake_margin_m(leader, station_m, stop_m, 80) < 0.1
@@ -102,7 +102,7 @@ def test_brake_before_the_stop_is_the_shortest_that_keeps_the_distance(headway_m
 
 def test_vehicle_about_to_merge_is_kept_away_from_until_then():
     merging = pieces(0.0, -110.0, 12.0, [(12.0, 20.0), (20.0, 4.0)])
-    fleet = fleet_of((merging, 24.0, True), (pieces(0.0, -120.0, 16.0), UNDECIDED, True))
+    fleet = fleet_of((merging, 24.0), (pieces(0.0, -120.0, 16.0), UNDECIDED))
     proposal = empty_proposal()
     assert propose_stop(fleet, proposal, 1, -1.0, 0.0, RULES)
     times_s = np.linspace(0.0, 24.0, 2401)
@@ -127,7 +127,7 @@ def test_vehicle_of_a_queue_that_starts_waits_until_the_time_gap_has_come_about(
     cruise_s = (329.0 - 0.75 * start_s**2 - 51.2) / 16.0
     leader = pieces(0.0, -330.0, 0.0, [(16.0, start_s), (16.0, cruise_s), (0.0, 6.4)])
     assert leader[-1, 1] == close(-1.0)
-    fleet = fleet_of((leader, UNDECIDED, True), (standing(-338.74), UNDECIDED, True))
+    fleet = fleet_of((leader, UNDECIDED), (standing(-338.74), UNDECIDED))
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 1, -40.0, 0.0, rules)
     expected = [
@@ -144,7 +144,7 @@ def test_vehicle_of_a_queue_that_starts_waits_until_the_time_gap_has_come_about(
 def test_vehicle_of_a_queue_behind_one_that_stands_for_ever_stays():
     for time_gap_s in (0.0, 1.0):
         rules = RULES._replace(safety=RULES.safety._replace(time_gap_s=time_gap_s))
-        fleet = fleet_of((standing(-100.0), UNDECIDED, True), (standing(-108.74), UNDECIDED, True))
+        fleet = fleet_of((standing(-100.0), UNDECIDED), (standing(-108.74), UNDECIDED))
         proposal = empty_proposal()
         assert not propose_place_ahead(fleet, proposal, 1, -9.0, 0.0, rules)
         assert proposal.size[0] == 0
@@ -159,7 +159,7 @@ def test_nobody_waits_where_the_distances_of_eq_1_are_all():
 
 
 def test_place_ahead_drives_on_as_committed_and_leaves_out_the_old_stop():
-    fleet = fleet_of((stopping(-160.0, -30.0), UNDECIDED, True))
+    fleet = fleet_of((stopping(-160.0, -30.0), UNDECIDED))
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 0, -10.0, 1.0, RULES)
     expected = [[1.0, -144.0, 16.0, 0.0], [6.175, -61.2, 16.0, -2.5], [12.575, -10.0, 0.0, 0.0]]
@@ -168,7 +168,7 @@ def test_place_ahead_drives_on_as_committed_and_leaves_out_the_old_stop():
 
 def test_place_ahead_brakes_where_someone_is_in_the_way():
     leader = stopping(-110.0, -1.0, 12.0)
-    fleet = fleet_of((leader, UNDECIDED, True), (stopping(-120.0, -60.0), UNDECIDED, True))
+    fleet = fleet_of((leader, UNDECIDED), (stopping(-120.0, -60.0), UNDECIDED))
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 1, -6.2, 0.0, RULES)
     proposed = _proposed(proposal)
@@ -183,9 +183,9 @@ def test_place_ahead_must_not_touch_who_is_behind(behind_m, possible):
     # braking for the leader brings the subject back onto a follower that is near
     leader = stopping(-110.0, -1.0, 12.0)
     fleet = fleet_of(
-        (stopping(behind_m, -26.0), UNDECIDED, True),
-        (stopping(-120.0, -20.0), UNDECIDED, True),
-        (leader, UNDECIDED, True),
+        (stopping(behind_m, -26.0), UNDECIDED),
+        (stopping(-120.0, -20.0), UNDECIDED),
+        (leader, UNDECIDED),
     )
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 1, -6.2, 0.0, RULES) is possible
@@ -195,7 +195,7 @@ def test_place_ahead_must_not_touch_who_is_behind(behind_m, possible):
 def test_place_ahead_keeps_the_commitment_s_own_pace():
     # 1 m/s2 where a new approach would take 1.5
     gently = pieces(0.0, -200.0, 12.0, [(16.0, 4.0), (16.0, 4.0), (0.0, 6.4)])
-    fleet = fleet_of((gently, UNDECIDED, True))
+    fleet = fleet_of((gently, UNDECIDED))
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 0, -10.0, 0.0, RULES)
     expected = [
@@ -209,9 +209,7 @@ def test_place_ahead_keeps_the_commitment_s_own_pace():
 
 
 def test_place_that_is_taken_is_not_to_be_had():
-    fleet = fleet_of(
-        (stopping(-100.0, -1.0), UNDECIDED, True), (stopping(-160.0, -20.0), UNDECIDED, True)
-    )
+    fleet = fleet_of((stopping(-100.0, -1.0), UNDECIDED), (stopping(-160.0, -20.0), UNDECIDED))
     for stop_m, free in ((-1.0, False), (-6.1399, False), (-6.14, True)):
         for propose in (propose_stop, propose_place_ahead):
             proposal = empty_proposal()
@@ -222,9 +220,9 @@ def test_place_that_is_taken_is_not_to_be_had():
 def test_standing_vehicle_beyond_a_merging_one_is_in_the_way():
     merging = pieces(0.0, -140.0, 16.0, [(16.0, 8.75), (20.0, 2.0)])
     fleet = fleet_of(
-        (pieces(0.0, -40.0, 0.0), UNDECIDED, True),
-        (merging, 10.75, True),
-        (pieces(0.0, -160.0, 16.0), UNDECIDED, True),
+        (pieces(0.0, -40.0, 0.0), UNDECIDED),
+        (merging, 10.75),
+        (pieces(0.0, -160.0, 16.0), UNDECIDED),
     )
     assert not propose_stop(fleet, empty_proposal(), 2, -30.0, 0.0, RULES)
     assert propose_stop(fleet, empty_proposal(), 2, -46.0, 0.0, RULES)
@@ -232,7 +230,7 @@ def test_standing_vehicle_beyond_a_merging_one_is_in_the_way():
 
 def test_merging_vehicle_behind_is_not_the_concern_of_the_one_ahead():
     behind = pieces(0.0, -166.0, 16.0, [(16.0, 10.375), (20.0, 2.0)])
-    fleet = fleet_of((behind, 12.375, True), (pieces(0.0, -160.0, 16.0), UNDECIDED, True))
+    fleet = fleet_of((behind, 12.375), (pieces(0.0, -160.0, 16.0), UNDECIDED))
     proposal = empty_proposal()
     assert propose_stop(fleet, proposal, 1, -10.0, 0.0, RULES)
     assert _proposed(proposal)[0, 3] == 0.0

@@ -260,7 +260,7 @@ def test_collisions_and_the_unserved_stand_beside_the_delay():
 def test_the_figure_of_the_baseline_draws_every_baseline():
     figure = baseline_figure(baseline_rows())
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
-    assert len(lines["no control, fair drivers, one a baseline"].get_xdata()) == 3
+    assert len(lines["no control, fair drivers, one point per baseline"].get_xdata()) == 3
     assert list(lines["mainline priority"].get_ydata()) == pytest.approx([0.175])
     assert len(figure.axes) == 2
 

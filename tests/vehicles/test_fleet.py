@@ -33,7 +33,7 @@ def _pair(one, one_merge_s, other, other_merge_s, from_s=0.0, rules=RULES):
 
 
 def test_trajectories_and_merge_times_are_the_proposed_ones_where_there_are():
-    fleet = fleet_of((X, STREAM, True), (A, 12.0, True), (Y, STREAM, True))
+    fleet = fleet_of((X, STREAM), (A, 12.0), (Y, STREAM))
     proposal = empty_proposal()
     assert entry_of(proposal, 1) == -1
     assert (committed(fleet, 1) == A).all()

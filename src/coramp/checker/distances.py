@@ -59,11 +59,9 @@ def passes_s(pieces: FloatArray, station_m: float) -> float:
         way_m = station_m - s
         if way_m <= 0.0:
             return float(pieces[k, 0])
-        if abs(a) < 1e-12:
-            after_s = way_m / v if v > 0.0 else math.inf
-        else:
-            under = v * v + 2.0 * a * way_m
-            after_s = (math.sqrt(under) - v) / a if under >= 0.0 else math.inf
+        under = v * v + 2.0 * a * way_m  # the speed there, squared
+        twice_mean_mps = v + math.sqrt(under) if under >= 0.0 else 0.0
+        after_s = 2.0 * way_m / twice_mean_mps if twice_mean_mps > 0.0 else math.inf
         if 0.0 <= after_s <= lasts_s:
             return float(pieces[k, 0] + after_s)
     return math.inf

@@ -14,7 +14,8 @@ NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 def write_skeleton(name: str, folder: Path) -> Path:
     """Writes a package with a working strategy of that name and its contract test; returns it.
 
-    Raises CorampError for a name that is none or taken, and for a folder that holds something.
+    Raises CorampError for a name that is not valid or already taken, and for a folder that is
+    not empty.
     """
     if not NAME.fullmatch(name):
         raise CorampError(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
     TIME,
@@ -46,7 +46,6 @@ class Book(NamedTuple):
     exit_s: FloatArray
     way_first: IntArray
     way_count: IntArray
-    adjustable: BoolArray
     live: IntArray
     block_row: IntArray
     block_first: IntArray
@@ -67,7 +66,6 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.full(rows, math.inf),
         np.zeros(rows, np.int64),
         np.zeros(rows, np.int64),
-        np.zeros(rows, np.bool_),
         np.zeros(rows, np.int64),
         np.zeros(blocks, np.int64),
         np.zeros(blocks, np.int64),
@@ -179,7 +177,6 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
         book.merge_time_s,
         book.lowest_m,
         book.highest_m,
-        book.adjustable,
         book.live[: book.used[LIVE]],
     )
 
@@ -193,7 +190,6 @@ def add_row(book: Book, length_m: float, on_ramp: bool) -> int:
     row = book.used[ROWS]
     book.length_m[row] = length_m
     book.merge_time_s[row] = math.inf if on_ramp else -math.inf
-    book.adjustable[row] = True
     book.used[ROWS] += 1
     return int(row)
 

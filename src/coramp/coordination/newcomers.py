@@ -24,7 +24,7 @@ class Newcomers:
     def are_held_up(
         self, ledger: Ledger, commands: Sequence[FollowTrajectory], time_s: float
     ) -> bool:
-        """Returns whether a new merge may bother a vehicle that has not entered by ``time_s``.
+        """Returns whether a new merge may hold up a vehicle that has not entered by ``time_s``.
 
         The merge must leave a length and the clearance to the foremost place that such a vehicle
         can have, on the way that it would drive with nobody before it.

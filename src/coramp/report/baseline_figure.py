@@ -95,7 +95,7 @@ def _draw_baselines(
                 markerfacecolor="none",
                 markersize=4.0,
                 linestyle="",
-                label=f"no control, {population} drivers, one a baseline",
+                label=f"no control, {population} drivers, one point per baseline",
             )
     ours = [
         row

@@ -230,7 +230,7 @@ class EntryPolicy:
     ``asked``: it is asked about every vehicle as that enters, with the vehicle as the subject.
     ``holds_newcomers``: its merges may stand in the way of mainline vehicles that are yet to enter;
     these brake as they enter, or wait outside until they can enter safely. Without it a merge that
-    would bother one of them is refused. ``slowest_share``: no mainline vehicle brakes below this
+    would hold one of them up is refused. ``slowest_share``: no mainline vehicle brakes below this
     share of v0 as it enters; it waits outside instead.
     """
 

@@ -98,7 +98,7 @@ def _road_users(
 
 @kernel
 def _keep_ramp_order(ramp: FloatArray) -> None:
-    """Has nobody count before the tail of who is ahead, however slow that one is."""
+    """Keeps every place behind the tail of the vehicle ahead, however slow that vehicle is."""
     for k in range(1, len(ramp)):
         tail_m = ramp[k - 1, VIRTUAL] - ramp[k - 1, LENGTH]
         if ramp[k, VIRTUAL] > tail_m:

@@ -70,7 +70,7 @@ def propose_shift(
     proposal as it was, where the bounds on acceleration and speed do not allow it.
     """
     entry = proposal.size[0]
-    if entry >= MAX_CHANGED or not fleet.adjustable[row] or entry_of(proposal, row) >= 0:
+    if entry >= MAX_CHANGED or entry_of(proposal, row) >= 0:
         return False
     start_s = max(window_start_s, fleet.merge_time_s[row])
     v0 = rules.road.mainline_speed_mps

@@ -185,5 +185,5 @@ def create(
 
 @kernel
 def unknown_bound_m(fleet: Fleet, situation: Situation) -> float:
-    """Returns the lowest intercept (m) that bothers no vehicle which is yet to enter."""
+    """Returns the lowest intercept (m) that holds up no vehicle which is yet to enter."""
     return situation.known_m + float(fleet.length_m[situation.subject]) + situation.clearance_m

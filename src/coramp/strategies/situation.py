@@ -34,7 +34,7 @@ class Situation(NamedTuple):
     will be on the mainline, front first; ``intercepts_m`` are theirs. ``lowest_m`` to ``highest_m``
     are the intercepts that the subject reaches with the accelerations of Eq. 22, ``free_m`` that
     of its free movement. ``known_m`` is the foremost intercept that a vehicle yet to enter can
-    have: a merge that would bother it is not the subject's to take.
+    have. The subject must not take a merge that would hold such a vehicle up.
     """
 
     subject: int
@@ -232,7 +232,7 @@ def gap_bounds_m(fleet: Fleet, situation: Situation, k: int) -> tuple[float, flo
 
     Gap k lies between ``order[k - 1]`` and ``order[k]``; the first has no front vehicle, the last
     no rear one. The lowest exceeds the highest where the gap is too small. Nowhere may the merge
-    bother a vehicle that is yet to enter.
+    hold up a vehicle that is yet to enter.
     """
     own_m = fleet.length_m[situation.subject] + situation.clearance_m
     return bounds_between_m(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
 from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
 from coramp.road.rules import Rules
@@ -28,7 +28,6 @@ class Fleet(NamedTuple):
     merge_time_s: FloatArray
     lowest_m: FloatArray
     highest_m: FloatArray
-    adjustable: BoolArray
     live: IntArray
 
 

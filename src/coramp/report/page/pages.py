@@ -129,7 +129,9 @@ def _difference(runs: Sequence[RunRecords]) -> list[str]:
             word = "less" if first <= second else "more"
             parts.append(f"{abs(second - first):.2f} s {word} on the {stream}")
     return (
-        [f"On the same arrivals, {title_of(runs[0])} loses {' and '.join(parts)}."] if parts else []
+        [f"On the same arrivals, with {title_of(runs[0])} they lose {' and '.join(parts)}."]
+        if parts
+        else []
     )
 
 

@@ -141,15 +141,17 @@ def _answer(good: pl.DataFrame) -> str:
         name = look_of(str(strategy), str(drivers) if drivers else None).label
         losing.setdefault(delays, []).append(name)
     parts = [
-        f"{_lose(names)} {mainline_s} s on the mainline and {ramp_s} s on the ramp"
+        f"{mainline_s} s on the mainline and {ramp_s} s on the ramp with {_listed(names)}"
         for (mainline_s, ramp_s), names in losing.items()
     ]
-    return f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals: {'; '.join(parts)}."
+    return (
+        f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals, vehicles lose {'; '.join(parts)}."
+    )
 
 
-def _lose(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     *others, last = names
-    return f"{', '.join(others)} and {last} each lose" if others else f"{last} loses"
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _notes(study: Study, runs: pl.DataFrame) -> Iterator[str]:
