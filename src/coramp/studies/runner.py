@@ -84,12 +84,16 @@ Results = Generator[tuple[RunSpec, Part], None, None]
 
 @contextmanager
 def _quietly_closed(results: Results) -> Iterator[Results]:
-    """Gives up what is under way where a study stops, without joblib's warning of that."""
-    try:
-        yield results
-    finally:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "[0-9]+ tasks", UserWarning)
+    """Gives up what is under way where a study stops, without joblib's warnings.
+
+    It warns of tasks that are given up, and of workers that it replaces since their memory grew.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "[0-9]+ tasks", UserWarning)
+        warnings.filterwarnings("ignore", "A worker stopped", UserWarning)
+        try:
+            yield results
+        finally:
             results.close()
 
 
