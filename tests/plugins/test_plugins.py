@@ -17,7 +17,12 @@ from coramp.cli.skeleton import write_skeleton
 from coramp.coordination.guard import Guarded
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
-from coramp.strategies.base import Decision, DriveWithAcceleration, FollowTrajectory
+from coramp.strategies.base import (
+    Decision,
+    DriveWithAcceleration,
+    FollowTrajectory,
+    ReleaseToDriver,
+)
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.parameters import parameter
 from coramp.testing import check_strategy
@@ -48,6 +53,10 @@ def not_finite(decide):
 def commanding_nobody(decide):
     command = decide.commands[0]
     return Decision((FollowTrajectory(9999, command.pieces, command.merge_time_s),))
+
+
+def leaving_to_drivers(decide):
+    return Decision((ReleaseToDriver(decide.commands[0].row),))
 
 
 def asleep(_):
@@ -145,6 +154,7 @@ MISTAKES = [
     (raising, "raises ZeroDivisionError: no gap to divide by"),
     (not_finite, "commands numbers that are not finite"),
     (commanding_nobody, "commands an unknown vehicle, row 9999"),
+    (leaving_to_drivers, "commands ReleaseToDriver; allowed is that where cooperative is False"),
     (asleep, "takes longer than"),
     (swallowing_everything, "takes longer than"),
     (busy_and_swallowing_everything, "takes longer than"),

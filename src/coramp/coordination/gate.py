@@ -42,16 +42,19 @@ ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
 class Gate(NamedTuple):
     """Requests to enter, who is next on each stream (0 mainline, 1 ramp), and who entered when.
 
-    The first four fields are those of the world's feed; a request is read, and counted in
-    ``feed[HEARD]``, only when its step has come. ``of_stream[s]`` lists the ``vehicles[s]``
-    requests of a stream that have been heard; ``next_place[s]`` is the place of the first that has
-    not entered, and ``try_step[s]`` when that tries. ``row_*`` have an entry a row of the book: its
-    request, the step at which it entered, the one at which it is planned. ``asks`` is True where
-    the strategy is asked about each vehicle as it enters. A mainline vehicle waits outside rather
-    than brake below ``slowest_mps`` as it enters. Both have one entry. ``feed`` is how many
-    requests have been heard, how many the feed has, and whether the gate is open. ``refused[s]`` is
-    whom of a stream the checker refused last and why, and how many commitments and vehicles on the
-    road there were then.
+    The first four fields are those of the world's feed. A request is read, and counted in
+    ``feed[HEARD]``, only when its step has come.
+
+    - ``of_stream[s]``: the ``vehicles[s]`` requests of stream s that have been heard.
+    - ``next_place[s]``: the place among them of the first that has not entered.
+    - ``try_step[s]``: the step at which that one tries to enter.
+    - ``row_arrival``, ``row_step``, ``row_due_step``: for each row of the book its request, the
+      step at which it entered, and the step at which it is to be planned.
+    - ``asks[0]``: whether the strategy is asked about each vehicle as it enters.
+    - ``slowest_mps[0]``: a mainline vehicle waits outside rather than enter and brake below this.
+    - ``feed``: requests heard, requests that the feed has, and whether the gate is open.
+    - ``refused[s]``: which vehicle of a stream the checker refused last and why, and how many
+      commitments and vehicles on the road there were then.
     """
 
     step: IntArray

@@ -50,6 +50,7 @@ class Guarded:
         self.name = strategy.name
         self.period_s = _period_checked(strategy)
         self.metered = is_metered(strategy)
+        self._cooperative = bool(getattr(strategy, "cooperative", True))
         self.entry_policy = entry_policy_of(strategy)
         self._strategy = strategy
         self._longest_s = longest_s
@@ -62,11 +63,22 @@ class Guarded:
         self._time_s = view.time_s
         decision, problem = self._asked(shown := _copied(view), memory)
         problem = problem or _written_into(shown, view) or _wrong_with(decision, view)
+        problem = problem or self._for_drivers(decision)
         if self._at_once > MOST_AT_ONCE:
             problem = "wakes itself without end"
         if problem or decision is None:
             raise CorampError(f"strategy {self.name}: at {view.time_s:.1f} s it {problem}")
         return decision
+
+    def _for_drivers(self, decision: Decision | None) -> str:
+        """Says which command nobody would carry out where all vehicles are cooperative."""
+        if not self._cooperative or decision is None:
+            return ""
+        for command in decision.commands:
+            if isinstance(command, ReleaseToDriver | SetRampSignal):
+                what = type(command).__name__
+                return f"commands {what}; allowed is that where cooperative is False"
+        return ""
 
     def _asked(self, view: View, memory: Memory) -> tuple[Decision | None, str]:
         try:

@@ -34,7 +34,10 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """A road sensor saw a vehicle, which need not be connected; deviations are standard ones."""
+    """A road sensor saw a vehicle, which need not be connected; deviations are standard ones.
+
+    No world gives detections yet: all vehicles report themselves.
+    """
 
     time_s: float
     station_m: float

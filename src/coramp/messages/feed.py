@@ -1,4 +1,4 @@
-"""Requests to enter, as a world hands them over: in order of time, and as many as it has so far."""
+"""The growing list of requests to enter that a world offers the coordinator, in order of time."""
 
 import math
 from collections.abc import Iterable

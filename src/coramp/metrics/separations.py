@@ -100,7 +100,7 @@ def lane_extremes(
 
 @kernel
 def lane_events(lane: LaneUse) -> tuple[FloatArray, IntArray, IntArray]:
-    """Returns times (s), kinds and vehicles of all comings and goings in a lane, in their order."""
+    """Returns times (s), kinds and stays of all comings and goings in a lane, in their order."""
     n = len(lane.from_s)
     times_s, kinds = np.empty(2 * n), np.empty(2 * n, np.int64)
     vehicles = np.empty(2 * n, np.int64)

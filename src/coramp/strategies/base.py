@@ -125,7 +125,8 @@ class FollowTrajectory:
 
     They take the place of all that is committed, from the earliest time at which a vehicle can act,
     ``time_s + actuation_delay_s``; their first time is that, their first station and speed what is
-    committed for then. ``makes_gap`` tells that the vehicle moves aside for another.
+    committed for then. ``makes_gap`` tells that the vehicle moves aside for another:
+    the checker then allows it more than v0, by ``motion.speed_deviation``, until the merge.
     """
 
     row: int
@@ -152,7 +153,7 @@ class DriveWithAcceleration:
 
 @dataclass(frozen=True, slots=True)
 class SetRampSignal:
-    """Set the signal at the ramp's stop line (the nose) to green or red."""
+    """Set the signal at the ramp's stop line, upstream of the nose, to green or red."""
 
     green: bool
 
@@ -170,8 +171,9 @@ Command = FollowTrajectory | DriveWithAcceleration | SetRampSignal | ReleaseToDr
 class Explanation(NamedTuple):
     """Why a vehicle got its plan; rows are -1 and numbers nan where there is none.
 
-    Severities are in m2/s4. The last three are stations at the decision of vehicles that cruise at
-    v0, or will: run back from there.
+    Severities are in m2/s4. The last three are where conflict, front and rear vehicle would be at
+    the decision if they had always cruised at v0 as they will in the end; that need not be where
+    they are.
     """
 
     row: int

@@ -33,8 +33,9 @@ class Situation(NamedTuple):
     v0 keep theirs, and their differences are their distances. ``order`` lists the rows that are or
     will be on the mainline, front first; ``intercepts_m`` are theirs. ``lowest_m`` to ``highest_m``
     are the intercepts that the subject reaches with the accelerations of Eq. 22, ``free_m`` that
-    of its free movement. ``known_m`` is the foremost intercept that a vehicle yet to enter can
-    have. The subject must not take a merge that would hold such a vehicle up.
+    of its free movement. ``known_m`` bounds what is
+    known: no vehicle yet to enter can come to an intercept ahead of it. The subject must not take a
+    merge that would hold such a vehicle up.
     """
 
     subject: int
