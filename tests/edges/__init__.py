@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 
-from coramp.cli.commands import main
+from coramp.cli.entry import main
 
 
 @dataclass(frozen=True)

@@ -664,7 +664,7 @@ def test_help_is_quick_because_it_imports_nothing_heavy(arguments, light):
     heavy = {"numba", "numpy", "polars", "scipy", "libsumo", "matplotlib", "rich.table", *light}
     code = (
         "import sys\n"
-        "from coramp.cli.commands import main\n"
+        "from coramp.cli.entry import main\n"
         "try:\n"
         f"    main({arguments!r})\n"
         "finally:\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from coramp import CorampError
-from coramp.cli.commands import main
+from coramp.cli.entry import main
 from tests.edges import (
     SMALL_STUDY,
     assert_refused,

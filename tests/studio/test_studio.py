@@ -12,7 +12,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 import coramp
-from coramp.cli.commands import main
+from coramp.cli.entry import main
 from coramp.errors import CorampError
 from coramp.runs.running import recorded
 from coramp.strategies.mainline_priority import MainlinePriority

@@ -6,7 +6,7 @@ import pytest
 
 import coramp
 from coramp.api import outlook
-from coramp.cli.commands import main
+from coramp.cli.entry import main
 from tests.study import GRID, written
 
 

@@ -21,13 +21,13 @@ from coramp.audit.driving import (
     check_reports,
     check_trajectories,
     driven_in_sumo,
+    off_the_order_at,
     ordered,
 )
 from coramp.audit.figures import Derived, derive
 from coramp.audit.inputs import Inputs, read_inputs
 from coramp.audit.kinematics import ROUNDING
 from coramp.audit.orders import Motion, Passages, exits_s, passages_of
-from coramp.audit.positions import off_the_order
 from coramp.audit.verdicts import Audit, Check, Finding, finding, judged, unchecked
 from coramp.coordination.examination import bounds_of
 from coramp.errors import CorampError
@@ -220,13 +220,7 @@ def _plan_error_m(inputs: Inputs, motion: Motion) -> float | None:
     asked = ~np.isnan(log.numbers("accel_mps2")[rows])
     asked |= (log.frame["kind"].gather(rows) == COMPARISON).to_numpy()
     rows = rows[asked & (of_s == time_s)]
-    off = off_the_order(
-        motion,
-        log.vehicle[rows],
-        log.numbers("time_s")[rows],
-        log.numbers("station_m")[rows],
-        log.numbers("speed_mps")[rows],
-    )
+    off = off_the_order_at(log, rows, motion)
     return float(np.nanmax(np.abs(off[:, 0]), initial=0.0))
 
 

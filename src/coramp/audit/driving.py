@@ -11,6 +11,7 @@ from coramp.audit.positions import due_reports, expected_in_sumo, off_the_order
 from coramp.audit.verdicts import Check, Finding, finding, judged
 from coramp.coordination.examination import bounds_of
 from coramp.messages.log import COMPARISON, REPORT, report_steps
+from coramp.messages.reading import MessageLog
 
 COMMITMENT = "a commitment"
 PLAN_ERROR_M = 0.05
@@ -40,17 +41,17 @@ def check_kinematics(inputs: Inputs) -> Check:
     return judged("kinematics of commands", how, findings)
 
 
+def off_the_order_at(log: MessageLog, rows: IntArray, motion: Motion) -> FloatArray:
+    """Returns how far (m) and how much faster (m/s) each position told is than ordered, (n, 2)."""
+    columns = ("time_s", "station_m", "speed_mps")
+    return off_the_order(motion, log.vehicle[rows], *(log.numbers(name)[rows] for name in columns))
+
+
 def check_reports(inputs: Inputs, motion: Motion) -> Check:
     """Holds every position that was told to the commitment in force."""
     log = inputs.log
     rows = log.of_kind(REPORT, COMPARISON)
-    off = off_the_order(
-        motion,
-        log.vehicle[rows],
-        log.numbers("time_s")[rows],
-        log.numbers("station_m")[rows],
-        log.numbers("speed_mps")[rows],
-    )
+    off = off_the_order_at(log, rows, motion)
     std_m = log.numbers("std_m")[rows]
     exactly_m = ROUNDING if inputs.exact else PLAN_ERROR_M + ROUNDING
     allowed_m = np.where(std_m > 0.0, DEVIATIONS * std_m, exactly_m)
@@ -167,13 +168,7 @@ def _not_driven_on(inputs: Inputs) -> list[Finding]:
     odd = (vehicle[1:] == vehicle[:-1]) & ~(np.abs(off_m) <= DRIVEN_ON_M)
     found = list(zip(obeying[1:][odd].tolist(), off_m[odd].tolist(), strict=True))
     rows = np.setdiff1d(log.of_kind(REPORT, COMPARISON), obeying)
-    off = off_the_order(
-        motion,
-        log.vehicle[rows],
-        log.numbers("time_s")[rows],
-        log.numbers("station_m")[rows],
-        log.numbers("speed_mps")[rows],
-    )
+    off = off_the_order_at(log, rows, motion)
     exactly = log.numbers("std_m")[rows] == 0.0
     wrong = exactly & ~(np.abs(off) <= (DRIVEN_ON_M, DRIVEN_ON_MPS)).all(axis=1)
     found += zip(rows[wrong].tolist(), off[wrong, 0].tolist(), strict=True)
@@ -228,13 +223,7 @@ def check_positions(inputs: Inputs) -> list[Check]:
     first = np.searchsorted(vehicle, np.arange(len(log.requests) + 1)).astype(np.int64)
     reports = log.of_kind(REPORT)
     motion = Motion(first, np.ascontiguousarray(rows))
-    off = off_the_order(
-        motion,
-        log.vehicle[reports],
-        log.numbers("time_s")[reports],
-        log.numbers("station_m")[reports],
-        log.numbers("speed_mps")[reports],
-    )
+    off = off_the_order_at(log, reports, motion)
     findings = [
         finding(log, int(reports[k]), "positions.parquet", f"is {off[k, 0]:+.3f} m off it")
         for k in np.flatnonzero(~(np.abs(off[:, 0]) <= SAMPLED_M)).tolist()

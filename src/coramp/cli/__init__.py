@@ -1,5 +1,5 @@
 """The command line."""
 
-from coramp.cli.commands import main
+from coramp.cli.entry import main
 
 __all__ = ["main"]

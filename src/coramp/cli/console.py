@@ -3,27 +3,24 @@
 import dataclasses
 import json
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
 
 from coramp.api import PlanResult, RunResult, StudyResult
 from coramp.audit.verdicts import Audit
+from coramp.cli.run_table import run_table
 from coramp.explain.decision import Quantity
 from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
 from coramp.runs.running import finite_or_none
 from coramp.studies.outlook import Outlook
-from coramp.studies.runner import Progress as StudyState
 from coramp.studies.tables import Table, number
 
 if TYPE_CHECKING:
@@ -31,8 +28,6 @@ if TYPE_CHECKING:
 
 WIDE = 240
 """Columns of tables that do not go to a terminal."""
-QUIET_REPORT_S = 10.0
-"""How often progress is told where there is no terminal to draw a bar on."""
 
 
 def _console() -> Console:
@@ -94,95 +89,6 @@ def working(text: str) -> Iterator[None]:
         return
     with console.status(text):
         yield
-
-
-def run_table(summary: Row) -> Table:
-    """Returns the summary of a run as a table of two columns."""
-    who = f"{summary['strategy']}"
-    if summary["drivers"]:
-        who += f", {summary['drivers']} drivers"
-    lines = [
-        ("delay of all (s): mean", number(summary["delay_s"])),
-        *_bound_lines(summary),
-        (
-            "mainline delay (s): mean, 95th percentile",
-            _two(summary, "mainline_delay_s", "mainline_delay_p95_s"),
-        ),
-        (
-            "ramp delay (s): mean, 95th percentile",
-            _two(summary, "ramp_delay_s", "ramp_delay_p95_s"),
-        ),
-        (
-            "mainline speed (m/s): mean, over 1 s bins ±",
-            _two(summary, "mainline_speed_mps", "mainline_speed_std_mps"),
-        ),
-        (
-            "ramp speed (m/s): mean, over 1 s bins ±",
-            _two(summary, "ramp_speed_mps", "ramp_speed_std_mps"),
-        ),
-        (
-            "vehicles: mainline, ramp, unserved",
-            f"{summary['vehicles_mainline']}, {summary['vehicles_ramp']}, {summary['unserved']}",
-        ),
-        ("fuel (l)", number(summary["fuel_l"])),
-        (
-            "collisions, safe-distance violations",
-            f"{summary['collisions']}, {summary['safety_violations']}",
-        ),
-        ("smallest margin over the safe distance (m)", _margin(summary)),
-        ("smallest TTC (s), largest DRAC (m/s2)", _two(summary, "min_ttc_s", "max_drac_mps2")),
-        (
-            "largest severity J (m2/s4), hardest braking (m/s2)",
-            _two(summary, "max_severity", "max_decel_mps2"),
-        ),
-    ]
-    lines += [
-        (
-            "brakings beyond 3 and 4.5 m/s2, vehicles that stopped",
-            f"{summary['hard_brakings_3']}, {summary['hard_brakings_4_5']}, {summary['stops']}",
-        ),
-    ]
-    if summary["drivers"] is None:
-        rungs = ("free", "reach", "create", "delay", "hold")
-        lines += [
-            ("largest difference between plan and SUMO (m)", number(summary["plan_error_m"], 4)),
-            ("commands that were not safe and replaced", str(summary["interventions"])),
-        ]
-        if any(summary[f"rung_{rung}"] for rung in rungs):
-            by_rung = ", ".join(f"{rung} {summary[f'rung_{rung}']}" for rung in rungs)
-            lines += [
-                ("ramp vehicles by rung", by_rung),
-                ("vehicles adjusted for others", str(summary["adjusted_vehicles"])),
-            ]
-    lines.append(("computed in (s)", number(summary["wall_s"])))
-    title = (
-        f"{summary['scenario']}: {who}, {summary['mainline_veh_h']:g} + {summary['ramp_veh_h']:g} "
-        f"veh/h, seed {summary['seed']}"
-    )
-    return Table(title, ("what", "value"), tuple(lines))
-
-
-def _bound_lines(summary: Row) -> list[tuple[str, str]]:
-    if summary["lane_limit_veh_h"] is None:
-        return []
-    return [
-        (
-            "least delay that the lane allows (s), delay over that",
-            _two(summary, "delay_bound_s", "delay_bound_ratio"),
-        ),
-        ("most that the lane carries (veh/h)", number(summary["lane_limit_veh_h"], 0)),
-    ]
-
-
-def _margin(summary: Row) -> str:
-    """The least margin, with its equation where that is not Eq. 1."""
-    equation = summary["min_margin_equation"]
-    over = f", over Eq. {equation}" if equation not in (None, 1) else ""
-    return f"{number(summary['min_margin_m'], 3)}{over}"
-
-
-def _two(summary: Row, first: str, second: str) -> str:
-    return f"{number(summary[first])}, {number(summary[second])}"
 
 
 def print_run(result: RunResult, out: Path | None) -> None:
@@ -381,77 +287,3 @@ def serving(address: str, show: bool) -> None:
         import webbrowser
 
         webbrowser.open(address)
-
-
-class StudyProgress:
-    """A bar with rate and remaining time, or a line now and then where there is no terminal."""
-
-    def __init__(self) -> None:
-        self._console = Console(stderr=True, highlight=False)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[last]}"),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
-        self._task = self._bar.add_task("runs", total=None, rate="", last="")
-        self._started = time.monotonic()
-        self._told = self._started
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._bar.stop()
-
-    def __call__(self, state: StudyState) -> None:
-        """Shows how far the study is."""
-        if state.last is None:
-            self._begin(state)
-            return
-        elapsed_s = time.monotonic() - self._started
-        rate = state.done / elapsed_s if elapsed_s > 0.0 else 0.0
-        finished = state.skipped + state.done
-        failed = f", {state.failed} failed" if state.failed else ""
-        self._bar.update(
-            self._task,
-            completed=finished,
-            total=state.total,
-            rate=f"{rate:.1f}/s{failed}",
-            last=_last(state),
-        )
-        if not self._console.is_terminal and (
-            finished == state.total or time.monotonic() - self._told > QUIET_REPORT_S
-        ):
-            self._told = time.monotonic()
-            left_s = (state.total - finished) / rate if rate else 0.0
-            self._console.print(
-                f"{finished} of {state.total} runs{failed}, {rate:.1f}/s, {left_s:.0f} s left"
-            )
-
-    def _begin(self, state: StudyState) -> None:
-        self._started = self._told = time.monotonic()
-        if state.skipped:
-            self._console.print(f"{state.skipped} of {state.total} runs are there already")
-        if state.damaged:
-            self._console.print(f"{counted(state.damaged, 'result')} found damaged, to run again")
-        self._bar.update(self._task, completed=state.skipped, total=state.total)
-
-
-def _last(state: StudyState) -> str:
-    if state.last is None:
-        return ""
-    run = state.last.run
-    flows = f"{run['mainline_veh_h']:g}+{run['ramp_veh_h']:g}"
-    delays = f"{number(run['mainline_delay_s'])}/{number(run['ramp_delay_s'])} s"
-    return f"{run['strategy']} {flows}: {delays if run['status'] == 'ok' else run['error']}"

@@ -3,7 +3,6 @@
 Driven by the control clock alone. It knows no simulator: a plant carries the vehicles.
 """
 
-import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,6 +38,7 @@ from coramp.coordination.ledger import Ledger
 from coramp.coordination.newcomers import Newcomers
 from coramp.coordination.plant import Plant
 from coramp.coordination.supervisor import drive_safely
+from coramp.coordination.wakes import PERIOD, Wakes
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
@@ -77,12 +77,6 @@ class Refusal:
     reason: str
 
 
-PERIOD = -1
-"""Stands for a vehicle's row where the strategy is woken by its own clock."""
-ASKED, DUE = range(2)
-"""Kinds of wakes: the strategy asked for it, or the vehicle reaches its decision station."""
-
-
 class Coordinator:
     """Runs one strategy over the requests to enter that a world feeds.
 
@@ -118,8 +112,7 @@ class Coordinator:
         self._plant = plant
         self._memory: Memory = None
         self._step_s = rules.control.step_s
-        self._due_step: dict[int, int] = {}
-        self._wakes: list[tuple[int, int, int]] = []
+        self._wakes = Wakes()
         self._announced = self._told_of_entries = 0
         period_s = period_of(strategy)
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
@@ -128,18 +121,17 @@ class Coordinator:
         """Lets every request be heard at its step, and starts the strategy's own clock, if any."""
         open_gate(self._gate)
         if self._period_steps:
-            self._wake(self._period_steps, PERIOD)
+            self._wakes.ask(self._period_steps, PERIOD)
 
     def run(self, last_step: int) -> None:
         """Handles every event up to and including ``last_step``."""
         while True:
-            next_wake = self._wakes[0][0] if self._wakes else NEVER
-            self._admit(min(last_step, next_wake))
-            if not self._wakes or self._wakes[0][0] > last_step:
+            self._admit(min(last_step, self._wakes.next_step))
+            step = self._wakes.next_step
+            if step > last_step:
                 if next_step(self._gate) > last_step:
                     return
                 continue
-            step = self._wakes[0][0]
             if self._plant is not None:
                 self._plant.advance(step)
             self._handle_wakes(step)
@@ -173,12 +165,11 @@ class Coordinator:
         if self._asks_at_entry:
             for row in range(new.start, new.stop):
                 step = int(self._gate.row_step[row])
-                self._wake(step, row)
+                self._wakes.ask(step, row)
                 first_due = min(first_due, step)
         for row, due in enumerate(self._gate.row_due_step[new].tolist(), new.start):
             if due != NEVER:
-                self._due_step[row] = due
-                self._wake(due, row, DUE)
+                self._wakes.due(due, row)
                 first_due = min(first_due, due)
         return first_due
 
@@ -201,7 +192,7 @@ class Coordinator:
         """Has every ramp vehicle on the road planned at ``step``, wherever it is, front first."""
         rows = undecided_in_lane_order(ways_of(self.ledger.book), step * self._step_s)
         for row in rows.tolist():
-            self._due_step.pop(row, None)
+            self._wakes.planned(row)
             self._decide((row,), step)
 
     def waiting(self) -> list[int]:
@@ -209,11 +200,9 @@ class Coordinator:
         return sorted(set(range(int(self._gate.feed[HEARD]))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
-        if self._wakes[0][:2] == (step, PERIOD):
-            heapq.heapreplace(self._wakes, (step + self._period_steps, PERIOD, ASKED))
-            if len(self.ledger.fleet.live):
-                self._decide((), step)
-        while subjects := self._woken(step):
+        if self._wakes.tick(step, self._period_steps) and len(self.ledger.fleet.live):
+            self._decide((), step)
+        while subjects := self._wakes.woken(step):
             ready = self._ready(subjects, step)
             if ready:
                 self._decide(ready, step)
@@ -235,20 +224,6 @@ class Coordinator:
             return
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
-
-    def _woken(self, step: int) -> tuple[int, ...]:
-        rows: dict[int, None] = {}
-        while self._wakes and self._wakes[0][0] == step:
-            _, row, kind = heapq.heappop(self._wakes)
-            if kind == ASKED:
-                rows[row] = None
-            elif self._due_step.get(row) == step:  # else its way has changed since
-                del self._due_step[row]
-                rows[row] = None
-        return tuple(rows)
-
-    def _wake(self, step: int, row: int, kind: int = ASKED) -> None:
-        heapq.heappush(self._wakes, (step, row, kind))
 
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts who asks to enter on the road, from that station; False where that is not safe."""
@@ -277,13 +252,12 @@ class Coordinator:
         self.ledger.commit(row, pieces, merge_time_s, now_s)
         self._examiner.note(row, pieces, merge_time_s, now_s)
         if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
-            self._due_step.pop(row, None)
+            self._wakes.planned(row)
         self._announce(row, step)
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
         due_s = decision_due_s(pieces, self._rules.road.decision_station_m)
-        self._due_step[row] = max(step, first_step_from(due_s, self._step_s))
-        self._wake(self._due_step[row], row, DUE)
+        self._wakes.due(max(step, first_step_from(due_s, self._step_s)), row)
 
     def _goes_on_to_station(self, row: int, step: int) -> bool:
         """Whether a vehicle whose stop lay before its decision station can now go on towards it."""
@@ -369,7 +343,7 @@ class Coordinator:
         self._record(decision, trajectories, time_s, margin_m)
         for wake_s, row in decision.wakes_s:
             wake_step = first_step_from(wake_s, self._step_s)
-            self._wake(wake_step, row)
+            self._wakes.ask(wake_step, row)
             if self._asks_at_entry:
                 self._moves_up_in_time(row, step, wake_step)
             elif wake_step > step:
@@ -397,7 +371,7 @@ class Coordinator:
         pieces = self.ledger.trajectory(row)
         if self._plant is not None:
             self._plant.follow(row, pieces, self.ledger.merge_time_s(row))
-        if row in self._due_step:
+        if self._wakes.is_due(row):
             self._plan_when_due(row, pieces, step)
 
     def _refuse(self, subjects: tuple[int, ...], step: int, code: int) -> None:
@@ -405,7 +379,7 @@ class Coordinator:
         retry_step = first_step_from(retry_s, self._step_s)
         for row in subjects:
             self._note_refusal(step, row, code)
-            self._wake(retry_step, row)
+            self._wakes.ask(retry_step, row)
 
     def _record(
         self,

@@ -1,4 +1,8 @@
-"""The channel between world and coordinator, perfect for now: at once, and nothing is lost."""
+"""What the loop tells a world, and a channel that keeps it: at once, and nothing is lost.
+
+The channel stands between coordinator and world only where messages are kept; else the coordinator
+calls the world itself. What vehicles tell does not pass through it.
+"""
 
 from typing import Protocol
 
