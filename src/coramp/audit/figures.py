@@ -52,7 +52,7 @@ def derive(
     until_s = np.where(np.isnan(passages.exit_s), end_s, passages.exit_s)
     gone_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
     lanes = [
-        extremes_in_lane(driven, askers.length_m, stays, bounds)
+        extremes_in_lane(driven, askers.traits, stays, bounds)
         for stays in _lanes(askers, passages, gone_s)
     ]
     least = np.min([lane.extremes for lane in lanes], axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
 from coramp.messages.commands import Command, Enter, SetSignal
-from coramp.messages.log import COMMAND, ENTRY, STREAMS
+from coramp.messages.log import COMMAND, ENTRY, STREAMS, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog, read_log
 from coramp.records.run import MESSAGES, RunRecords
 from coramp.records.run_folder import read_run
@@ -55,18 +55,21 @@ def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     known = set(run.vehicles["vehicle_id"].to_list())
     path = folder / f"{MESSAGES}.parquet"
     log = read_log(path, scenario.control.step_s, known, put_in_order)
-    askers = _askers(log)
+    askers = _askers(log, scenario)
     rows = log.of_kind(ENTRY, COMMAND)[: 0 if len(log.strangers) else None]
     return Inputs(folder, run, scenario, log, askers, _orders(log, askers, rows), rows)
 
 
-def _askers(log: MessageLog) -> Askers:
+def _askers(log: MessageLog, scenario: Scenario) -> Askers:
     asked = log.frame[log.requests]
+    usual = scenario.usual_traits(0.0)
+    traits = [asked[name].fill_null(getattr(usual, name)) for name in TRAIT_COLUMNS]
     return Askers(
         (asked["stream"] == STREAMS[1]).to_numpy(),
         asked["time_s"].to_numpy(),
         asked["speed_mps"].to_numpy(),
         asked["length_m"].to_numpy(),
+        np.column_stack([column.to_numpy() for column in traits]),
     )
 
 

@@ -7,7 +7,14 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.audit.orders import Askers, Orders
-from coramp.checker.distances import Bounds, state_at
+from coramp.checker.distances import (
+    ACCELERATION,
+    BRAKING,
+    POWER,
+    TOP_SPEED,
+    Bounds,
+    state_at,
+)
 
 (
     FINE,
@@ -81,7 +88,8 @@ def faults_of(orders: Orders, askers: Askers, road: Road, bounds: Bounds) -> Fau
         if code == FINE:
             code, given, due = _joins(pieces)
         if code == FINE:
-            code, given, due = _keeps_limits(pieces, orders.merge_s[k], bounds)
+            able = askers.traits[vehicle]
+            code, given, due = _keeps_limits(pieces, orders.merge_s[k], able, bounds)
         if code == FINE:
             code, given, due = _ends_well(pieces, orders.merge_s[k], bounds)
         found.code[k], found.given[k], found.due[k] = code, given, due
@@ -135,18 +143,31 @@ def _joins(pieces: FloatArray) -> tuple[int, float, float]:
 
 
 @kernel
-def _keeps_limits(pieces: FloatArray, merge_s: float, bounds: Bounds) -> tuple[int, float, float]:
-    """Speeds are extreme at knots. One that begins too fast, as some enter, may slow down."""
+def _keeps_limits(
+    pieces: FloatArray, merge_s: float, able: FloatArray, bounds: Bounds
+) -> tuple[int, float, float]:
+    """Speeds are extreme at knots. One that begins too fast, as some enter, may slow down.
+
+    ``able`` is what the vehicle can do. With a power P per mass it speeds up by P / v at most, which
+    is least at the end of a piece.
+    """
     for i in range(len(pieces)):
         t, s, v, a = pieces[i]
         before_merge = t < merge_s
         limit_mps = bounds.mainline_speed_mps * bounds.gap_speed_factor
         if before_merge and s < -ROUNDING:
             limit_mps = bounds.ramp_limit_mps
-        limit_mps = max(limit_mps, pieces[0, 2])
+        limit_mps = max(min(limit_mps, able[TOP_SPEED]), pieces[0, 2])
         most_mps2 = bounds.comfort_mps2
         if a > 0.0 and s > -ROUNDING and before_merge and merge_s < math.inf:
             most_mps2 = bounds.ramp_acceleration_mps2
+        if a > 0.0:
+            ends_mps = pieces[i + 1, 2] if i + 1 < len(pieces) else v
+            most_mps2 = min(most_mps2, able[ACCELERATION])
+            if ends_mps > 0.0:
+                most_mps2 = min(most_mps2, able[POWER] / ends_mps)
+        else:
+            most_mps2 = min(most_mps2, able[BRAKING])
         if v < -ROUNDING:
             return BACKWARDS, v, 0.0
         if v > limit_mps + ROUNDING:

@@ -11,7 +11,16 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.audit.orders import Motion, place_in, under_way
-from coramp.checker.distances import Bounds, following_distance_m, lane_change_distance_m
+from coramp.checker.distances import (
+    LENGTH,
+    MASS,
+    POSITIONING,
+    Bounds,
+    Needs,
+    following_distance_m,
+    lane_change_distance_m,
+    needs_of,
+)
 
 MARGIN, MERGE_FRONT, MERGE_REAR, TTC, DRAC, SEVERITY, GAP, VIOLATIONS = range(8)
 """Places among the extremes of a lane: margins (m) over Eq. 1, 15 and 16, TTC (s), DRAC (m/s2),
@@ -38,10 +47,11 @@ class Pairs(NamedTuple):
     violations: FloatArray
 
 
-def extremes_in_lane(motion: Motion, length_m: FloatArray, stays: Stays, bounds: Bounds) -> Pairs:
+def extremes_in_lane(motion: Motion, traits: FloatArray, stays: Stays, bounds: Bounds) -> Pairs:
     """Returns what is extreme among neighbours in a lane, overlaps included.
 
-    Severity is that of Eq. 5, 8 and 9 as printed, at lane changes, with the speed along the lane.
+    ``traits`` has one row per vehicle (``checker.distances``). Severity is that of Eq. 5, 7 and 9 as
+    printed, at lane changes, with the speed along the lane, for the lighter of the two vehicles.
     """
     used = np.flatnonzero(stays.from_s < stays.until_s)
     stays = Stays._make(column[used] for column in stays)
@@ -54,7 +64,7 @@ def extremes_in_lane(motion: Motion, length_m: FloatArray, stays: Stays, bounds:
     extremes[[MARGIN, MERGE_FRONT, MERGE_REAR, TTC, GAP]] = math.inf
     noted = np.empty((4 * count + 4, 4))
     _pass_through(
-        motion, length_m, stays, times_s[order], comes[order], stay[order], bounds, extremes, noted
+        motion, traits, stays, times_s[order], comes[order], stay[order], bounds, extremes, noted
     )
     return Pairs(extremes, noted[: int(extremes[VIOLATIONS])])
 
@@ -74,7 +84,7 @@ class _Lane(NamedTuple):
 @kernel
 def _pass_through(
     motion: Motion,
-    length_m: FloatArray,
+    traits: FloatArray,
     stays: Stays,
     times_s: FloatArray,
     comes: IntArray,
@@ -98,9 +108,7 @@ def _pass_through(
         for before, after in pairs:
             if before >= 0 and after >= 0:
                 since_s = lane.since_s[after]
-                _look(
-                    motion, length_m, stays, before, after, since_s, now_s, bounds, extremes, noted
-                )
+                _look(motion, traits, stays, before, after, since_s, now_s, bounds, extremes, noted)
         if comes[e] == 0:
             _link(lane, front, rear, now_s)
             continue
@@ -110,7 +118,7 @@ def _pass_through(
             for other in (front, rear):
                 if other >= 0:
                     _look_at_merge(
-                        motion, length_m, stays, stay, other, now_s, bounds, extremes, noted
+                        motion, traits, stays, stay, other, now_s, bounds, extremes, noted
                     )
 
 
@@ -156,7 +164,7 @@ def _note(
 @kernel
 def _look_at_merge(
     motion: Motion,
-    length_m: FloatArray,
+    traits: FloatArray,
     stays: Stays,
     stay: int,
     other: int,
@@ -168,17 +176,20 @@ def _look_at_merge(
     own, theirs = stays.vehicle[stay], stays.vehicle[other]
     own_m, own_mps = _state(motion, own, now_s)
     other_m, other_mps = _state(motion, theirs, now_s)
-    front, rear, gap_m, side = theirs, own, other_m - length_m[theirs] - own_m, MERGE_FRONT
+    front, rear, gap_m, side = theirs, own, other_m - traits[theirs, LENGTH] - own_m, MERGE_FRONT
     if other_m < own_m:
-        front, rear, gap_m, side = own, theirs, own_m - length_m[own] - other_m, MERGE_REAR
-    margin_m = gap_m - lane_change_distance_m(own_mps, other_mps, bounds)
+        front, rear, gap_m, side = own, theirs, own_m - traits[own, LENGTH] - other_m, MERGE_REAR
+    errors_m = traits[own, POSITIONING] + traits[theirs, POSITIONING]
+    margin_m = gap_m - lane_change_distance_m(own_mps, other_mps, errors_m, bounds)
     extremes[side] = min(extremes[side], margin_m)
     if margin_m < -ROUNDING_M:
         _note(extremes, noted, now_s, front, rear, margin_m)
     along_mps = own_mps * bounds.cos_merge_angle
     faster_mps, slower_mps = max(along_mps, other_mps), min(along_mps, other_mps)
     if faster_mps > slower_mps:
-        collision_mps2 = (faster_mps - slower_mps) / (2.0 * COLLISION_S)
+        lighter_kg = min(traits[own, MASS], traits[theirs, MASS])
+        ratio = lighter_kg / max(traits[own, MASS], traits[theirs, MASS])
+        collision_mps2 = (faster_mps - slower_mps) / ((1.0 + ratio) * COLLISION_S)
         urgent_mps2 = math.inf
         if gap_m > 0.0:
             urgent_mps2 = (faster_mps**2 - slower_mps**2) / (2.0 * gap_m)
@@ -188,7 +199,7 @@ def _look_at_merge(
 @kernel
 def _look(
     motion: Motion,
-    length_m: FloatArray,
+    traits: FloatArray,
     stays: Stays,
     front_stay: int,
     rear_stay: int,
@@ -203,6 +214,7 @@ def _look(
     front_end, rear_end = motion.first[front + 1], motion.first[rear + 1]
     i = under_way(rows, motion.first[front], front_end, start_s)
     j = under_way(rows, motion.first[rear], rear_end, start_s)
+    needs = needs_of(traits[front], traits[rear])
     least_m, least_s, now_s = math.inf, start_s, start_s
     while True:
         until_s = end_s
@@ -210,9 +222,7 @@ def _look(
             until_s = min(until_s, rows[i + 1, 0])
         if j + 1 < rear_end:
             until_s = min(until_s, rows[j + 1, 0])
-        margin_m, when_s = _between_knots(
-            rows, i, length_m[front], j, now_s, until_s, bounds, extremes
-        )
+        margin_m, when_s = _between_knots(rows, i, j, now_s, until_s, needs, bounds, extremes)
         if margin_m < least_m:
             least_m, least_s = margin_m, when_s
         if until_s >= end_s:
@@ -231,10 +241,10 @@ def _look(
 def _between_knots(
     rows: FloatArray,
     i: int,
-    length_m: float,
     j: int,
     start_s: float,
     end_s: float,
+    needs: Needs,
     bounds: Bounds,
     extremes: FloatArray,
 ) -> tuple[float, float]:
@@ -244,39 +254,40 @@ def _between_knots(
     middle_s = end_s
     if opening_mps * opening_mps2 < 0.0:
         middle_s = min(end_s, start_s - opening_mps / opening_mps2)
-    least_m, least_s = _least_of_parabola(rows, i, length_m, j, start_s, middle_s, bounds)
+    least_m, least_s = _least_of_parabola(rows, i, j, start_s, middle_s, needs, bounds)
     if middle_s < end_s:
-        later_m, later_s = _least_of_parabola(rows, i, length_m, j, middle_s, end_s, bounds)
+        later_m, later_s = _least_of_parabola(rows, i, j, middle_s, end_s, needs, bounds)
         if later_m < least_m:
             least_m, least_s = later_m, later_s
     if end_s > start_s:
-        _closing(rows, i, length_m, j, start_s, end_s, extremes)
+        _closing(rows, i, j, start_s, end_s, needs.front_length_m, extremes)
     return least_m, least_s
 
 
 @kernel
 def _margin_m(
-    rows: FloatArray, i: int, length_m: float, j: int, time_s: float, bounds: Bounds
+    rows: FloatArray, i: int, j: int, time_s: float, needs: Needs, bounds: Bounds
 ) -> float:
     front_m, front_mps = place_in(rows, i, time_s)
     rear_m, rear_mps = place_in(rows, j, time_s)
-    return front_m - length_m - rear_m - following_distance_m(front_mps, rear_mps, bounds)
+    needed_m = following_distance_m(front_mps, rear_mps, needs, bounds)
+    return front_m - needs.front_length_m - rear_m - needed_m
 
 
 @kernel
 def _least_of_parabola(
     rows: FloatArray,
     i: int,
-    length_m: float,
     j: int,
     start_s: float,
     end_s: float,
+    needs: Needs,
     bounds: Bounds,
 ) -> tuple[float, float]:
     half_s = 0.5 * (end_s - start_s)
-    at_start = _margin_m(rows, i, length_m, j, start_s, bounds)
-    at_middle = _margin_m(rows, i, length_m, j, start_s + half_s, bounds)
-    at_end = _margin_m(rows, i, length_m, j, end_s, bounds)
+    at_start = _margin_m(rows, i, j, start_s, needs, bounds)
+    at_middle = _margin_m(rows, i, j, start_s + half_s, needs, bounds)
+    at_end = _margin_m(rows, i, j, end_s, needs, bounds)
     least_m, least_s = at_start, start_s
     if at_end < least_m:
         least_m, least_s = at_end, end_s
@@ -294,10 +305,10 @@ def _least_of_parabola(
 def _closing(
     rows: FloatArray,
     i: int,
-    length_m: float,
     j: int,
     start_s: float,
     end_s: float,
+    length_m: float,
     extremes: FloatArray,
 ) -> None:
     """Takes in TTC = g / c and DRAC = c^2 / (2 g), and the gap g itself.

@@ -18,6 +18,7 @@ class Askers(NamedTuple):
     time_s: FloatArray
     speed_mps: FloatArray
     length_m: FloatArray
+    traits: FloatArray
 
 
 class Orders(NamedTuple):

@@ -1,6 +1,6 @@
 """Feeds a log to a fresh coordinator, without any world."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.metered import MeteredRoad
@@ -8,10 +8,11 @@ from coramp.messages.channel import Channel
 from coramp.messages.commands import Command, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.messages.feed import RequestFeed
-from coramp.messages.log import READING, STREAMS
+from coramp.messages.log import READING, STREAMS, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider
+from coramp.vehicles.traits import Traits
 
 
 class Replayed(NamedTuple):
@@ -23,14 +24,25 @@ class Replayed(NamedTuple):
 
 def requests_in(log: MessageLog) -> list[RequestToEnter]:
     """Returns the requests of a log, in their order."""
-    asked = log.frame[log.requests]
-    columns = (asked[name].to_list() for name in ("vehicle_id", "stream", "speed_mps", "length_m"))
+    asked = log.frame[log.requests].iter_rows(named=True)
     return [
-        RequestToEnter(name, stream == STREAMS[1], step, speed_mps, length_m)
-        for name, stream, speed_mps, length_m, step in zip(
-            *columns, log.step[log.requests].tolist(), strict=True
+        RequestToEnter(
+            row["vehicle_id"],
+            row["stream"] == STREAMS[1],
+            step,
+            row["speed_mps"],
+            row["length_m"],
+            row["vehicle_type"],
+            _traits_in(row),
         )
+        for row, step in zip(asked, log.step[log.requests].tolist(), strict=True)
     ]
+
+
+def _traits_in(row: dict[str, Any]) -> Traits | None:
+    """Returns what a vehicle said that it can do, None where only the common limits bind it."""
+    told = {name: row[name] for name in TRAIT_COLUMNS if row[name] is not None}
+    return None if set(told) == {"length_m"} else Traits(**told)
 
 
 def readings_in(log: MessageLog) -> list[DetectorReading]:

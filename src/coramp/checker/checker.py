@@ -6,7 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.checker.distances import Bounds, state_at
+from coramp.checker.distances import (
+    ACCELERATION,
+    BRAKING,
+    POWER,
+    TOP_SPEED,
+    Bounds,
+    state_at,
+)
 from coramp.checker.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
 from coramp.checker.reasons import (
     ACCEPTED,
@@ -25,7 +32,7 @@ from coramp.checker.reasons import (
     TOO_FAST,
     TOO_HARD,
 )
-from coramp.checker.record import LENGTH, LIVE, Record, forget_exited, way_of
+from coramp.checker.record import LIVE, Record, forget_exited, way_of
 
 
 class Change(NamedTuple):
@@ -42,12 +49,15 @@ class Change(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A vehicle's request to enter: when (s), where (m), how fast (m/s), how long (m), by where."""
+    """A vehicle's request to enter: when (s), where (m), how fast (m/s), what it can do, by where.
+
+    ``traits`` are columns of ``distances``.
+    """
 
     time_s: float
     station_m: float
     speed_mps: float
-    length_m: float
+    traits: FloatArray
     on_ramp: bool
 
 
@@ -106,12 +116,13 @@ def examine_entry(record: Record, entry: Entry, pieces: FloatArray, bounds: Boun
     if code == ACCEPTED:
         code = _examine_end(pieces, merge_s, bounds)
     if code == ACCEPTED:
-        code = _examine_speeds(pieces, merge_s, pieces, False, -math.inf, bounds)
+        mine = Way(pieces, entry.traits, merge_s)
+        code = _examine_speeds(mine, pieces, False, -math.inf, bounds)
     if code == ACCEPTED:
-        code = _examine_accelerations(pieces, merge_s, bounds)
+        code = _examine_accelerations(mine, bounds)
     if code != ACCEPTED:
         return Verdict(code, -1, -1, math.nan)
-    mine = Way(pieces, entry.length_m, merge_s)
+    mine = Way(pieces, entry.traits, merge_s)
     nobody = np.empty(0, np.int64)
     code, other, least = _examine_against_others(record, nobody, -1, mine, math.inf, bounds)
     return Verdict(code, -1, other, least)
@@ -141,7 +152,7 @@ def _examine_against_others(
 @kernel
 def _changed_way(record: Record, change: Change, k: int) -> Way:
     pieces = change.pieces[k, : change.piece_count[k]]
-    return Way(pieces, record.traits[change.rows[k], LENGTH], change.merge_s[k])
+    return Way(pieces, record.traits[change.rows[k]], change.merge_s[k])
 
 
 @kernel
@@ -173,9 +184,10 @@ def _examine_command(
     if code == ACCEPTED:
         makes_gap = change.makes_gap[k] == 1
         gap_made_s = _last_merge_s(change)
-        code = _examine_speeds(pieces, merge_s, before.pieces, makes_gap, gap_made_s, bounds)
+        mine = Way(pieces, before.traits, merge_s)
+        code = _examine_speeds(mine, before.pieces, makes_gap, gap_made_s, bounds)
     if code == ACCEPTED:
-        code = _examine_accelerations(pieces, merge_s, bounds)
+        code = _examine_accelerations(Way(pieces, before.traits, merge_s), bounds)
     return code
 
 
@@ -240,16 +252,14 @@ def _examine_end(pieces: FloatArray, merge_s: float, bounds: Bounds) -> int:
 
 @kernel
 def _examine_speeds(
-    pieces: FloatArray,
-    merge_s: float,
-    before: FloatArray,
-    makes_gap: bool,
-    gap_made_s: float,
-    bounds: Bounds,
+    mine: Way, before: FloatArray, makes_gap: bool, gap_made_s: float, bounds: Bounds
 ) -> int:
-    """``before`` is what was commanded until now; the gap is made by ``gap_made_s``."""
-    v0 = bounds.mainline_speed_mps
-    entered_mps = pieces[0, 2]
+    """``before`` is what was commanded until now; the gap is made by ``gap_made_s``.
+
+    No vehicle is commanded more than its own top speed, but for one that enters faster.
+    """
+    pieces, merge_s, v0 = mine.pieces, mine.merge_s, bounds.mainline_speed_mps
+    top_mps, entered_mps = mine.traits[TOP_SPEED], pieces[0, 2]
     for i in range(len(pieces)):
         t, s, v, _ = pieces[i]
         if v < -EXACT:
@@ -260,7 +270,8 @@ def _examine_speeds(
             limit_mps = max(limit_mps, before_mps)
             if t < gap_made_s:
                 limit_mps = max(limit_mps, v0 * bounds.gap_speed_factor)
-        elif v <= entered_mps:  # one that enters too fast slows down from there
+        limit_mps = min(limit_mps, top_mps)
+        if not (makes_gap and t >= merge_s) and v <= entered_mps:  # it slows down from its entry
             limit_mps = max(limit_mps, entered_mps)
         if v > limit_mps + JOIN:
             return TOO_FAST
@@ -277,12 +288,20 @@ def _last_merge_s(change: Change) -> float:
 
 
 @kernel
-def _examine_accelerations(pieces: FloatArray, merge_s: float, bounds: Bounds) -> int:
+def _examine_accelerations(mine: Way, bounds: Bounds) -> int:
+    """A vehicle of limited power P per mass may speed up by P / v at the end of each piece."""
+    pieces, merge_s, traits = mine.pieces, mine.merge_s, mine.traits
     for i in range(len(pieces)):
-        t, s, _, a = pieces[i]
-        most_mps2 = bounds.comfort_mps2
-        if a > 0.0 and s > -JOIN and t < merge_s < math.inf:
-            most_mps2 = bounds.ramp_acceleration_mps2
+        t, s, v, a = pieces[i]
+        most_mps2 = min(bounds.comfort_mps2, traits[BRAKING])
+        if a > 0.0:
+            most_mps2 = bounds.comfort_mps2
+            if s > -JOIN and t < merge_s < math.inf:
+                most_mps2 = bounds.ramp_acceleration_mps2
+            most_mps2 = min(most_mps2, traits[ACCELERATION])
+            ends_mps = pieces[i + 1, 2] if i + 1 < len(pieces) else v
+            if a * ends_mps > traits[POWER] * (1.0 + JOIN):
+                return TOO_HARD
         if abs(a) > most_mps2 + JOIN:
             return TOO_HARD
     return ACCEPTED

@@ -9,6 +9,25 @@ from typing import NamedTuple
 
 from coramp._kernel import FloatArray, kernel
 
+(
+    LENGTH,
+    POSITIONING,
+    CLOCK,
+    TIME_GAP,
+    TOP_SPEED,
+    ACCELERATION,
+    POWER,
+    BRAKING,
+    MASS,
+) = range(9)
+TRAITS = 9
+"""Columns of what a vehicle can do, and how many there are.
+
+Length (m), errors of Eq. 1 (m, s), own time gap as a follower (s), top speed (m/s), largest
+acceleration at rest (m/s2), power per mass (W/kg), hardest braking (m/s2), mass (kg). Infinity
+where only the common bounds hold.
+"""
+
 
 class Bounds(NamedTuple):
     """What no plan may exceed; SI units, all positive but ``stop_station_m``."""
@@ -19,15 +38,24 @@ class Bounds(NamedTuple):
     mainline_speed_mps: float
     ramp_limit_mps: float
     cos_merge_angle: float
-    positioning_error_m: float
-    clock_error_s: float
     friction: float
-    time_gap_s: float
     standstill_gap_m: float
     allowance_m: float
     comfort_mps2: float
     ramp_acceleration_mps2: float
     gap_speed_factor: float
+
+
+class Needs(NamedTuple):
+    """What the distance of two vehicles depends on besides their speeds: the front one's length
+    (m), the sum of their positioning errors (m), their clock errors and the follower's gap (s).
+    """
+
+    front_length_m: float
+    errors_m: float
+    front_clock_s: float
+    rear_clock_s: float
+    time_gap_s: float
 
 
 @kernel
@@ -68,39 +96,55 @@ def passes_s(pieces: FloatArray, station_m: float) -> float:
 
 
 @kernel
-def following_distance_m(v_front: float, v_rear: float, bounds: Bounds) -> float:
-    """Returns 2 L_1 + L_2 + L_3 in m (Eq. 1-3, speeds in m/s), plus the optional gaps."""
-    closing_km_h = 3.6 * (v_rear - v_front)
-    braking_m = closing_km_h**2 / (254.0 * bounds.friction) if closing_km_h > 0.0 else 0.0
-    clock_m = bounds.clock_error_s * (v_front + v_rear)
-    by_paper_m = 2.0 * bounds.positioning_error_m + clock_m + braking_m
-    return by_paper_m + bounds.time_gap_s * v_rear + bounds.standstill_gap_m
+def needs_of(front: FloatArray, rear: FloatArray) -> Needs:
+    """Returns what two vehicles need of each other, from what they can do."""
+    errors_m = front[POSITIONING] + rear[POSITIONING]
+    return Needs(front[LENGTH], errors_m, front[CLOCK], rear[CLOCK], rear[TIME_GAP])
 
 
 @kernel
-def lane_change_distance_m(v_merging: float, v_other: float, bounds: Bounds) -> float:
+def following_distance_m(v_front: float, v_rear: float, needs: Needs, bounds: Bounds) -> float:
+    """Returns 2 L_1 + L_2 + L_3 in m (Eq. 1-3, speeds in m/s), plus the optional gaps.
+
+    2 L_1 is the sum of the two vehicles' own errors; each clock error counts with its speed.
+    """
+    closing_km_h = 3.6 * (v_rear - v_front)
+    braking_m = closing_km_h**2 / (254.0 * bounds.friction) if closing_km_h > 0.0 else 0.0
+    if needs.front_clock_s == needs.rear_clock_s:
+        clock_m = needs.front_clock_s * (v_front + v_rear)
+    else:
+        clock_m = needs.front_clock_s * v_front + needs.rear_clock_s * v_rear
+    by_paper_m = needs.errors_m + clock_m + braking_m
+    return by_paper_m + needs.time_gap_s * v_rear + bounds.standstill_gap_m
+
+
+@kernel
+def lane_change_distance_m(
+    v_merging: float, v_other: float, errors_m: float, bounds: Bounds
+) -> float:
     """Returns L_r-X, L_r-Y in m (Eq. 15, 16, speeds in m/s)."""
     along_km_h = 3.6 * (v_merging * bounds.cos_merge_angle - v_other)
-    return 2.0 * bounds.positioning_error_m + along_km_h**2 / (254.0 * bounds.friction)
+    return errors_m + along_km_h**2 / (254.0 * bounds.friction)
 
 
 @kernel
 def margin_at_m(
-    front: FloatArray, front_length_m: float, rear: FloatArray, time_s: float, bounds: Bounds
+    front: FloatArray, rear: FloatArray, time_s: float, needs: Needs, bounds: Bounds
 ) -> float:
     """Returns the bumper distance less the safe distance of Eq. 1 (m) at one moment."""
     s_front, v_front, _ = state_at(front, time_s)
     s_rear, v_rear, _ = state_at(rear, time_s)
-    return s_front - front_length_m - s_rear - following_distance_m(v_front, v_rear, bounds)
+    needed_m = following_distance_m(v_front, v_rear, needs, bounds)
+    return s_front - needs.front_length_m - s_rear - needed_m
 
 
 @kernel
 def least_between_m(
     front: FloatArray,
-    front_length_m: float,
     rear: FloatArray,
     start_s: float,
     end_s: float,
+    needs: Needs,
     bounds: Bounds,
 ) -> float:
     """Returns the least margin (m) on a span without knots and without a change of who is faster.
@@ -108,8 +152,8 @@ def least_between_m(
     There the margin is a parabola in time; three of its values give its vertex.
     """
     middle_s = 0.5 * (start_s + end_s)
-    at_start = margin_at_m(front, front_length_m, rear, start_s, bounds)
-    at_middle = margin_at_m(front, front_length_m, rear, middle_s, bounds)
+    at_start = margin_at_m(front, rear, start_s, needs, bounds)
+    at_middle = margin_at_m(front, rear, middle_s, needs, bounds)
     # the end belongs to the next piece; approach it from this one
     s_front, v_front, a_front = state_at(front, start_s)
     s_rear, v_rear, a_rear = state_at(rear, start_s)
@@ -118,9 +162,9 @@ def least_between_m(
         s_front
         + v_front * dt
         + a_front * dt * dt / 2.0
-        - front_length_m
+        - needs.front_length_m
         - (s_rear + v_rear * dt + a_rear * dt * dt / 2.0)
-        - following_distance_m(v_front + a_front * dt, v_rear + a_rear * dt, bounds)
+        - following_distance_m(v_front + a_front * dt, v_rear + a_rear * dt, needs, bounds)
     )
     least = min(at_start, at_end)
     bend = at_start - 2.0 * at_middle + at_end
@@ -134,10 +178,10 @@ def least_between_m(
 @kernel
 def least_margin_m(
     front: FloatArray,
-    front_length_m: float,
     rear: FloatArray,
     start_s: float,
     end_s: float,
+    needs: Needs,
     bounds: Bounds,
 ) -> float:
     """Returns the least margin (m) over Eq. 1 in [start, end]; ``end_s`` may be infinite.
@@ -160,8 +204,8 @@ def least_margin_m(
         if math.isinf(until_s):
             if abs(opening_rate) > 1e-12 or opening < -1e-9:
                 return -math.inf
-            return min(least, margin_at_m(front, front_length_m, rear, now_s, bounds))
-        least = min(least, least_between_m(front, front_length_m, rear, now_s, until_s, bounds))
+            return min(least, margin_at_m(front, rear, now_s, needs, bounds))
+        least = min(least, least_between_m(front, rear, now_s, until_s, needs, bounds))
         if until_s >= end_s:
             return least
         now_s = until_s
@@ -205,19 +249,19 @@ def envelope_of(pieces: FloatArray, from_s: float, v0_mps: float) -> Envelope:
 
 
 @kernel
-def margin_at_least_m(
-    front: Envelope, front_length_m: float, rear: Envelope, bounds: Bounds
-) -> float:
+def margin_at_least_m(front: Envelope, rear: Envelope, needs: Needs, bounds: Bounds) -> float:
     """Returns what the margins over Eq. 1, 15 and 16 (m) never fall below, however times coincide.
 
     Meaningless, and negative, where ``front`` may be behind ``rear``.
     """
-    following_m = following_distance_m(front.slowest_mps, rear.fastest_mps, bounds)
-    following_m += bounds.clock_error_s * (front.fastest_mps - front.slowest_mps)
+    following_m = following_distance_m(front.slowest_mps, rear.fastest_mps, needs, bounds)
+    following_m += needs.front_clock_s * (front.fastest_mps - front.slowest_mps)
     slowest_mps = min(front.slowest_mps, rear.slowest_mps)
     fastest_mps = max(front.fastest_mps, rear.fastest_mps)
-    lane_change_m = lane_change_distance_m(slowest_mps, fastest_mps, bounds)
+    errors_m = needs.errors_m
+    lane_change_m = lane_change_distance_m(slowest_mps, fastest_mps, errors_m, bounds)
     if fastest_mps * bounds.cos_merge_angle > slowest_mps:
-        lane_change_m = max(lane_change_m, lane_change_distance_m(fastest_mps, slowest_mps, bounds))
+        other_m = lane_change_distance_m(fastest_mps, slowest_mps, errors_m, bounds)
+        lane_change_m = max(lane_change_m, other_m)
     needed_m = max(following_m, lane_change_m)
-    return front.lowest_m - front_length_m - rear.highest_m - needed_m
+    return front.lowest_m - needs.front_length_m - rear.highest_m - needed_m

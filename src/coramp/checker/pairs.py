@@ -5,12 +5,15 @@ from typing import NamedTuple
 
 from coramp._kernel import FloatArray, kernel
 from coramp.checker.distances import (
+    LENGTH,
+    POSITIONING,
     Bounds,
     Envelope,
     envelope_of,
     lane_change_distance_m,
     least_margin_m,
     margin_at_least_m,
+    needs_of,
     passes_s,
     state_at,
 )
@@ -18,10 +21,10 @@ from coramp.checker.reasons import ACCEPTED, EXACT, TOO_NEAR, TOO_NEAR_AT_MERGE
 
 
 class Way(NamedTuple):
-    """One vehicle's trajectory, length and merge time (minus infinity on the mainline)."""
+    """One vehicle's trajectory, traits and merge time (minus infinity on the mainline)."""
 
     pieces: FloatArray
-    length_m: float
+    traits: FloatArray
     merge_s: float
 
 
@@ -81,9 +84,11 @@ def surely_apart(
         return True
     envelope = envelope_of(theirs.pieces, start_s, bounds.mainline_speed_mps)
     if my_envelope.lowest_m >= envelope.highest_m:
-        at_least = margin_at_least_m(my_envelope, mine.length_m, envelope, bounds)
+        needs = needs_of(mine.traits, theirs.traits)
+        at_least = margin_at_least_m(my_envelope, envelope, needs, bounds)
     else:
-        at_least = margin_at_least_m(envelope, theirs.length_m, my_envelope, bounds)
+        needs = needs_of(theirs.traits, mine.traits)
+        at_least = margin_at_least_m(envelope, my_envelope, needs, bounds)
     return at_least > max(least, bounds.allowance_m)
 
 
@@ -93,14 +98,16 @@ def _least_of_pair_m(mine: Way, theirs: Way, start_s: float, end_s: float, bound
     their_station_m, _, _ = state_at(theirs.pieces, start_s)
     front, rear = (mine, theirs) if my_station_m > their_station_m else (theirs, mine)
     until_s = min(end_s, passes_s(front.pieces, bounds.zone_end_m))
-    return least_margin_m(front.pieces, front.length_m, rear.pieces, start_s, until_s, bounds)
+    needs = needs_of(front.traits, rear.traits)
+    return least_margin_m(front.pieces, rear.pieces, start_s, until_s, needs, bounds)
 
 
 @kernel
 def _margin_at_merge_m(merging: Way, other: Way, merge_s: float, bounds: Bounds) -> float:
     s_merging, v_merging, _ = state_at(merging.pieces, merge_s)
     s_other, v_other, _ = state_at(other.pieces, merge_s)
-    needed_m = lane_change_distance_m(v_merging, v_other, bounds)
+    errors_m = merging.traits[POSITIONING] + other.traits[POSITIONING]
+    needed_m = lane_change_distance_m(v_merging, v_other, errors_m, bounds)
     if s_other > s_merging:
-        return s_other - other.length_m - s_merging - needed_m
-    return s_merging - merging.length_m - s_other - needed_m
+        return float(s_other - other.traits[LENGTH] - s_merging - needed_m)
+    return float(s_merging - merging.traits[LENGTH] - s_other - needed_m)

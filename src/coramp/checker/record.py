@@ -1,4 +1,4 @@
-"""What the checker has been told of every vehicle: how long it is, its stream, its commands.
+"""What the checker has been told of every vehicle: what it can do, its stream, its commands.
 
 The checker reads nothing else. Where a vehicle is, on which lane, how fast, and whether it is still
 on the road follows from its commands by the checker's own mathematics, not from the bookkeeping of
@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.checker.distances import passes_s
+from coramp.checker.distances import TRAITS, passes_s
 from coramp.checker.pairs import Way
 
 FIRST, COUNT = range(2)
 """Columns of ``Record.places``."""
-LENGTH, MERGE, EXIT = range(3)
-"""Columns of ``Record.traits``."""
+MERGE, EXIT = range(2)
+"""Columns of ``Record.times_s``."""
 ROWS, PIECES, LIVE, LONGEST = range(4)
 """Places in ``Record.used``; the last is the largest number of pieces that a row has had."""
 
@@ -25,15 +25,16 @@ ROWS, PIECES, LIVE, LONGEST = range(4)
 class Record(NamedTuple):
     """All that was commanded, with room to spare; ``used`` tells how much of what is in use.
 
-    Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. It is
-    ``traits[i, 0]`` long (m), comes onto the mainline at ``traits[i, 1]`` (s; minus infinity for a
-    mainline vehicle, infinity while no merge is commanded) and leaves the zone at ``traits[i, 2]``
-    (s; infinity while it would stop before). ``live`` lists the rows on the road, by entry.
+    Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. What it can
+    do is ``traits[i]`` (columns of ``distances``). It comes onto the mainline at ``times_s[i, 0]``
+    (minus infinity for a mainline vehicle, infinity while no merge is commanded) and leaves the
+    zone at ``times_s[i, 1]`` (infinity while it would stop before). ``live`` lists the rows on the road, by entry.
     """
 
     pieces: FloatArray
     places: IntArray
     traits: FloatArray
+    times_s: FloatArray
     live: IntArray
     used: IntArray
 
@@ -43,7 +44,8 @@ def empty_record(rows: int, pieces: int) -> Record:
     return Record(
         np.empty((pieces, 4)),
         np.zeros((rows, 2), np.int64),
-        np.full((rows, 3), math.inf),
+        np.zeros((rows, TRAITS)),
+        np.full((rows, 2), math.inf),
         np.zeros(rows, np.int64),
         np.zeros(4, np.int64),
     )
@@ -82,6 +84,7 @@ def _copy_live(record: Record, other: Record) -> None:
     """Copies everything but the pieces of those who are off the road into an empty record."""
     rows, live = record.used[ROWS], record.used[LIVE]
     other.traits[:rows] = record.traits[:rows]
+    other.times_s[:rows] = record.times_s[:rows]
     other.live[:live] = record.live[:live]
     at = 0
     for row in record.live[:live]:
@@ -108,16 +111,16 @@ def way_of(record: Record, row: int) -> Way:
     """Returns what a row drives from its last command on, and until that takes effect."""
     first = record.places[row, FIRST]
     pieces = record.pieces[first : first + record.places[row, COUNT]]
-    return Way(pieces, record.traits[row, LENGTH], record.traits[row, MERGE])
+    return Way(pieces, record.traits[row], record.times_s[row, MERGE])
 
 
 @kernel
 def note_entry(
-    record: Record, length_m: float, merge_s: float, pieces: FloatArray, zone_end_m: float
+    record: Record, traits: FloatArray, merge_s: float, pieces: FloatArray, zone_end_m: float
 ) -> int:
     """Notes a vehicle that enters on ``pieces``; returns its row."""
     row = record.used[ROWS]
-    record.traits[row, LENGTH] = length_m
+    record.traits[row] = traits
     _write(record, row, record.used[PIECES], pieces, merge_s, zone_end_m)
     record.live[record.used[LIVE]] = row
     record.used[LIVE] += 1
@@ -154,8 +157,8 @@ def _write(
     start, end = record.used[PIECES], at + len(pieces)
     record.pieces[at:end] = pieces
     record.places[row, FIRST], record.places[row, COUNT] = start, end - start
-    record.traits[row, MERGE] = merge_s
-    record.traits[row, EXIT] = passes_s(record.pieces[start:end], zone_end_m)
+    record.times_s[row, MERGE] = merge_s
+    record.times_s[row, EXIT] = passes_s(record.pieces[start:end], zone_end_m)
     record.used[PIECES] = end
     record.used[LONGEST] = max(record.used[LONGEST], end - start)
 
@@ -165,7 +168,7 @@ def forget_exited(record: Record, time_s: float) -> None:
     """Takes rows off the live list that have left the zone by ``time_s``."""
     kept = 0
     for k in range(record.used[LIVE]):
-        if record.traits[record.live[k], EXIT] > time_s:
+        if record.times_s[record.live[k], EXIT] > time_s:
             record.live[kept] = record.live[k]
             kept += 1
     record.used[LIVE] = kept

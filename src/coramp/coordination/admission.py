@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.equations.safe_distance import standing_clearance_m
+from coramp.coordination.entry_behind import entry_behind_others
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
     intercept_range_m,
@@ -29,6 +29,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     trajectory_under,
 )
+from coramp.vehicles.traits import own_rules, standing_behind_m
 
 LEAST_MOVE_M = 1.0
 """Places that would move up by less are left alone."""
@@ -37,13 +38,13 @@ LEAST_MOVE_M = 1.0
 @kernel
 def plan_entry(
     fleet: Fleet,
-    length_m: float,
+    traits: FloatArray,
     on_ramp: bool,
     time_s: float,
     station_m: float,
     speed_mps: float,
     slowest_mps: float,
-    rules: Rules,
+    common_rules: Rules,
 ) -> FloatArray:
     """Returns the trajectory with which a vehicle enters now, of length 0 if it must wait.
 
@@ -51,7 +52,14 @@ def plan_entry(
     it may come to a stand.
     """
     out = np.empty((MAX_PIECES, 4))
-    stop_m = stop_behind_m(fleet, rules) if on_ramp else math.inf
+    rules = own_rules(traits, common_rules, on_ramp)
+    if common_rules.traffic.differs and not on_ramp:
+        n = entry_behind_others(
+            fleet, traits, time_s, station_m, speed_mps, slowest_mps, common_rules, out
+        )
+        safe = safe_to_enter(fleet, out[:n], traits, on_ramp, time_s, common_rules)
+        return out[:n] if safe else out[:0]
+    stop_m = stop_behind_m(fleet, traits, common_rules) if on_ramp else math.inf
     step_s = rules.control.step_s
     most = math.ceil(speed_mps / rules.motion.slow_down_mps2 / step_s)
     if slowest_mps > 0.0:
@@ -62,7 +70,7 @@ def plan_entry(
         n = entry_with_brake(
             out, on_ramp, time_s, station_m, speed_mps, steps * step_s, stop_m, rules
         )
-        if safe_to_enter(fleet, out[:n], length_m, on_ramp, time_s, rules):
+        if safe_to_enter(fleet, out[:n], traits, on_ramp, time_s, common_rules):
             enough = steps
         elif steps == most:
             return out[:0]
@@ -102,12 +110,12 @@ def entry_with_brake(
 
 
 @kernel
-def stop_behind_m(fleet: Fleet, rules: Rules) -> float:
+def stop_behind_m(fleet: Fleet, traits: FloatArray, rules: Rules) -> float:
     """Returns where the next ramp vehicle must be able to stop: before the nose, or another."""
     stop_m = rules.road.stop_station_m
-    standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
     for row in fleet.live:
         if fleet.merge_time_s[row] == math.inf:
+            standing_m = standing_behind_m(fleet.traits[row], traits, rules)
             behind_m = stop_of_m(committed(fleet, row)) - fleet.length_m[row] - standing_m
             stop_m = min(stop_m, behind_m)
     return stop_m
@@ -122,14 +130,15 @@ def plan_moving_up(fleet: Fleet, from_s: float, rules: Rules) -> Proposal:
     """
     proposal = empty_proposal()
     rows = undecided_in_lane_order(fleet, from_s)
-    standing_m = standing_clearance_m(rules.road, rules.safety, rules.motion.stop_mps2)
     place_m = rules.road.stop_station_m
     for k in range(len(rows)):
         row = rows[k]
+        if k > 0:
+            standing_m = standing_behind_m(fleet.traits[rows[k - 1]], fleet.traits[row], rules)
+            stop_m = stop_of_m(trajectory_under(fleet, proposal, rows[k - 1]))
+            place_m = min(place_m, stop_m - fleet.length_m[rows[k - 1]] - standing_m)
         if place_m > stop_of_m(committed(fleet, row)) + LEAST_MOVE_M:
             propose_place_ahead(fleet, proposal, row, place_m, from_s, rules)
-        stop_m = stop_of_m(trajectory_under(fleet, proposal, row))
-        place_m = min(place_m, stop_m - fleet.length_m[row] - standing_m)
     return proposal
 
 
@@ -155,7 +164,7 @@ def undecided_in_lane_order(fleet: Fleet, time_s: float) -> IntArray:
 def safe_to_enter(
     fleet: Fleet,
     pieces: FloatArray,
-    length_m: float,
+    traits: FloatArray,
     on_ramp: bool,
     time_s: float,
     rules: Rules,
@@ -175,10 +184,10 @@ def safe_to_enter(
             continue
         margin_m = pair_margin_m(
             pieces,
-            length_m,
+            traits,
             merge_s,
             committed(fleet, row),
-            fleet.length_m[row],
+            fleet.traits[row],
             fleet.merge_time_s[row],
             time_s,
             rules,

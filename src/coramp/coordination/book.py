@@ -19,6 +19,7 @@ from coramp.kinematics.trajectory import (
     time_at_station,
 )
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.traits import LENGTH, Traits
 
 ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
 """Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
@@ -43,6 +44,7 @@ class Book(NamedTuple):
     merge_time_s: FloatArray
     lowest_m: FloatArray
     highest_m: FloatArray
+    traits: FloatArray
     exit_s: FloatArray
     way_first: IntArray
     way_count: IntArray
@@ -63,6 +65,7 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.full(rows, math.inf),
         np.full(rows, -math.inf),
         np.full(rows, math.inf),
+        np.zeros((rows, len(Traits._fields))),
         np.full(rows, math.inf),
         np.zeros(rows, np.int64),
         np.zeros(rows, np.int64),
@@ -177,18 +180,20 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
         book.merge_time_s,
         book.lowest_m,
         book.highest_m,
+        book.traits,
         book.live[: book.used[LIVE]],
     )
 
 
 @kernel
-def add_row(book: Book, length_m: float, on_ramp: bool) -> int:
+def add_row(book: Book, traits: FloatArray, on_ramp: bool) -> int:
     """Makes room for a vehicle that is about to enter; returns its row.
 
     It counts as on the road only with its first commitment.
     """
     row = book.used[ROWS]
-    book.length_m[row] = length_m
+    book.length_m[row] = traits[LENGTH]
+    book.traits[row] = traits
     book.merge_time_s[row] = math.inf if on_ramp else -math.inf
     book.used[ROWS] += 1
     return int(row)

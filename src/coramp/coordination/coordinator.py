@@ -327,7 +327,7 @@ class Coordinator:
             code = verdict.code
             if (
                 code == ACCEPTED
-                and not self._holds_newcomers
+                and not (self._holds_newcomers or self._rules.traffic.differs)
                 and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
             ):
                 code = HOLDS_NEWCOMERS

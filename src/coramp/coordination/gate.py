@@ -28,6 +28,7 @@ from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
+from coramp.vehicles.traits import traits_or_usual
 
 NEVER = 1 << 60
 WAITS = -1
@@ -42,7 +43,7 @@ ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
 class Gate(NamedTuple):
     """Requests to enter, who is next on each stream (0 mainline, 1 ramp), and who entered when.
 
-    The first four fields are those of the world's feed. A request is read, and counted in
+    The first five fields are those of the world's feed. A request is read, and counted in
     ``feed[HEARD]``, only when its step has come.
 
     - ``of_stream[s]``: the ``vehicles[s]`` requests of stream s that have been heard.
@@ -61,6 +62,7 @@ class Gate(NamedTuple):
     on_ramp: BoolArray
     speed_mps: FloatArray
     length_m: FloatArray
+    traits: FloatArray
     of_stream: IntArray
     vehicles: IntArray
     next_place: IntArray
@@ -283,9 +285,10 @@ def enter(
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     length_m, speed_mps = gate.length_m[arrival], gate.speed_mps[arrival]
+    traits = traits_or_usual(gate.traits[arrival], length_m, rules)
     pieces = plan_entry(
         ways_of(book),
-        length_m,
+        traits,
         on_ramp,
         time_s,
         station_m,
@@ -295,12 +298,12 @@ def enter(
     )
     if len(pieces) == 0:
         return WAITS
-    entry = Entry(time_s, station_m, speed_mps, length_m, on_ramp)
+    entry = Entry(time_s, station_m, speed_mps, traits, on_ramp)
     code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
         return code
-    row, road = add_row(book, length_m, on_ramp), rules.road
-    note_entry(record, length_m, book.merge_time_s[row], pieces, bounds.zone_end_m)
+    row, road = add_row(book, traits, on_ramp), rules.road
+    note_entry(record, traits, book.merge_time_s[row], pieces, bounds.zone_end_m)
     merge_s = book.merge_time_s[row]
     write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
     gate.row_arrival[row], gate.row_step[row] = arrival, step

@@ -8,7 +8,9 @@ import numpy as np
 
 from coramp._kernel import FloatArray
 from coramp.coordination.plant import STREAMS, Arrival
-from coramp.scenarios.model import Mainline, Ramp, Scenario
+from coramp.scenarios.model import Mainline, Ramp, Scenario, Vehicle
+from coramp.scenarios.vehicle_types import VehicleType
+from coramp.vehicles.traits import Traits
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:
@@ -89,8 +91,8 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
         ]
     numbers = (count(1), count(1))
     return [
-        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, speed_mps, length_m)
-        for step, on_ramp, speed_mps, length_m in sorted(given)
+        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, *rest)
+        for _, on_ramp, rest in sorted(given, key=lambda a: (*a[:2], *a[2][1:3]))
     ]
 
 
@@ -98,20 +100,38 @@ def _name(on_ramp: bool, number: int) -> str:
     return f"{'r' if on_ramp else 'm'}{number:05d}"
 
 
-Unnamed = tuple[int, bool, float, float]
-"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m)."""
+Rest = tuple[int, float, float, str, Traits | None]
+"""Of an arrival: step, speed (m/s), length (m), type, traits."""
+Unnamed = tuple[int, bool, Rest]
+"""An arrival without its name: step, by the ramp or not, and the rest."""
 
 
 def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
-    return [
-        (
-            round(arrival.time_s / scenario.control.step_s),
-            arrival.stream == "ramp",
-            arrival.speed_mps,
-            arrival.length_m or scenario.vehicle.length_m,
-        )
-        for arrival in scenario.arrivals
-    ]
+    found = []
+    for arrival in scenario.arrivals:
+        kind = scenario.type_named(arrival.type or "")
+        top_mps = arrival.top_speed_mps or 0.5 * sum(kind.top_speeds_mps)
+        step = round(arrival.time_s / scenario.control.step_s)
+        rest = _rest(scenario, kind, step, arrival.speed_mps, top_mps, arrival.length_m)
+        found.append((step, arrival.stream == "ramp", rest))
+    return found
+
+
+def _rest(
+    scenario: Scenario,
+    kind: VehicleType,
+    step: int,
+    speed_mps: float,
+    top_mps: float,
+    length_m: float | None = None,
+) -> Rest:
+    """Returns an arrival of a type; nobody enters faster than it can drive."""
+    length_m = kind.length_m if length_m is None else length_m
+    traits = None
+    if not isinstance(scenario.vehicle, Vehicle) or not math.isinf(top_mps):
+        own = kind.traits(scenario.usual_traits(length_m), top_mps)
+        traits = own._replace(length_m=length_m)
+    return step, min(speed_mps, top_mps), length_m, kind.name, traits
 
 
 def _stream_arrivals(
@@ -128,8 +148,33 @@ def _stream_arrivals(
     low_mps, high_mps = stream.entry_speed_mps
     speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
     steps = np.rint(times_s / step_s).astype(np.int64)
-    length_m = scenario.vehicle.length_m
+    kinds = kinds_of(scenario, on_ramp, len(times_s), seed)
     return [
-        (step, on_ramp, speed_mps, length_m)
-        for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
+        (step, on_ramp, _rest(scenario, kind, step, speed_mps, top_mps))
+        for step, speed_mps, (kind, top_mps) in zip(
+            steps.tolist(), speeds_mps.tolist(), kinds, strict=True
+        )
     ]
+
+
+def kinds_of(
+    scenario: Scenario, on_ramp: bool, count: int, seed: int
+) -> list[tuple[VehicleType, float]]:
+    """Returns type and top speed (m/s) of each vehicle of a stream, drawn by the types' shares.
+
+    A vehicle keeps its draws whatever else changes, so that a truck at a share of 10 % is one at
+    20 % as well where trucks come last in the list of types.
+    """
+    types, name = scenario.vehicle_types, STREAMS[on_ramp]
+    if len(types) == 1 and math.isinf(types[0].top_speeds_mps[1]):
+        return [(types[0], math.inf)] * count
+    up_to = np.cumsum([kind.share_of(on_ramp) for kind in types])
+    draws = generator(seed, f"vehicle types/{name}").random(count)
+    places = np.minimum(np.searchsorted(up_to, draws, side="right"), len(types) - 1)
+    shares = generator(seed, f"top speeds/{name}").random(count)
+    kinds = []
+    for place, share in zip(places.tolist(), shares.tolist(), strict=True):
+        low_mps, high_mps = types[place].top_speeds_mps
+        top_mps = high_mps if math.isinf(high_mps) else low_mps + share * (high_mps - low_mps)
+        kinds.append((types[place], top_mps))
+    return kinds

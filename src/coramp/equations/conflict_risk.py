@@ -82,16 +82,31 @@ def relative_urgent_acceleration_mps2(
 def conflict_severity_m2ps4(
     one_speed_mps: float, other_speed_mps: float, distance_m: float
 ) -> tuple[float, float]:
-    """Returns J of two vehicles of equal mass, with Eq. 9 as printed and in its relative form.
+    """Returns J of two vehicles of equal mass: ``severity_of_masses_m2ps4`` with k = 1."""
+    return severity_of_masses_m2ps4(one_speed_mps, other_speed_mps, distance_m, 1.0, 1.0)
 
+
+@kernel
+def severity_of_masses_m2ps4(
+    one_speed_mps: float,
+    other_speed_mps: float,
+    distance_m: float,
+    one_mass_kg: float,
+    other_mass_kg: float,
+) -> tuple[float, float]:
+    """Returns J of two vehicles, with Eq. 9 as printed and in its relative form.
+
+    It is that of the lighter vehicle, which suffers more: k = 10^p = m_1 / m_2 <= 1 in Eq. 7.
     ``distance_m`` is bumper to bumper; vehicles that overlap have an infinite severity, or none if
     their speeds are equal.
     """
+    lighter_kg, heavier_kg = min(one_mass_kg, other_mass_kg), max(one_mass_kg, other_mass_kg)
     faster_mps = max(one_speed_mps, other_speed_mps)
     slower_mps = min(one_speed_mps, other_speed_mps)
     if faster_mps == slower_mps:
         return 0.0, 0.0
-    collision_mps2 = collision_acceleration_of_log_ratio_mps2(faster_mps - slower_mps, 0.0)
+    log_ratio = math.log10(lighter_kg / heavier_kg)
+    collision_mps2 = collision_acceleration_of_log_ratio_mps2(faster_mps - slower_mps, log_ratio)
     return (
         severity_m2ps4(
             collision_mps2, urgent_acceleration_mps2(faster_mps, slower_mps, distance_m)

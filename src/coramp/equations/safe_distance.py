@@ -15,9 +15,17 @@ BRAKING_CONSTANT = 254.0
 
 
 @kernel
-def clock_distance_m(front_speed_mps: float, rear_speed_mps: float, clock_error_s: float) -> float:
-    """Returns L_2 = clock_error (v_1 + v_2) in m, the distance of the clock error (Eq. 2)."""
-    return clock_error_s * (front_speed_mps + rear_speed_mps)
+def clock_distance_m(
+    front_speed_mps: float,
+    rear_speed_mps: float,
+    clock_error_s: float,
+    follower_extra_s: float = 0.0,
+) -> float:
+    """Returns L_2 = clock_error (v_1 + v_2) in m, the distance of the clock error (Eq. 2).
+
+    ``follower_extra_s`` is by how much the follower's own clock error is larger.
+    """
+    return clock_error_s * (front_speed_mps + rear_speed_mps) + follower_extra_s * rear_speed_mps
 
 
 @kernel
@@ -45,7 +53,9 @@ def safe_distance_m(front_speed_mps: float, rear_speed_mps: float, safety: Safet
     """
     return (
         2.0 * safety.positioning_error_m
-        + clock_distance_m(front_speed_mps, rear_speed_mps, safety.clock_error_s)
+        + clock_distance_m(
+            front_speed_mps, rear_speed_mps, safety.clock_error_s, safety.follower_clock_extra_s
+        )
         + speed_difference_distance_m(
             front_speed_mps, rear_speed_mps, safety.adhesion, safety.resistance
         )
@@ -124,7 +134,7 @@ def standing_clearance_m(road: Road, safety: SafetyBudget, stop_mps2: float) -> 
     ``T v - v^2 (1 / (2 d) - 1 / (2 g (phi + psi)))`` further back.
     """
     still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
-    per_speed_s = safety.time_gap_s + 2.0 * safety.clock_error_s
+    per_speed_s = safety.time_gap_s + 2.0 * safety.clock_error_s + safety.follower_clock_extra_s
     spare_per_square = 0.5 / stop_mps2 - braking_distance_m(1.0, safety.adhesion, safety.resistance)
     speed_mps = road.ramp_limit_mps
     if spare_per_square > 0.0:

@@ -9,6 +9,13 @@ import math
 from coramp._kernel import FloatArray, kernel
 from coramp.kinematics.trajectory import ACCEL, SPEED, TIME, piece_end_s
 
+FUEL_MODELS = ("passenger-car", "heavy-duty")
+PASSENGER_CAR, HEAVY_DUTY = range(2)
+ROLLING, GRAVITY_MPS2 = 0.006, 9.8
+AIR_KG_PER_M = 0.5 * 1.2 * 5.2
+"""Half of air density (kg/m3) times drag area c_w A (m2) of an articulated truck."""
+IDLE_MLPS, WHEEL_J_PER_ML = 0.8, 0.40 * 35500.0
+"""Fuel of the idling engine, and work at the wheels per ml: efficiency times 35.5 kJ/ml (diesel)."""
 P0, P1, P2, P3 = 0.1569, 0.0245, -7.415e-4, 5.975e-5
 Q0, Q1, Q2 = 0.07224, 0.09681, 1.075e-3
 LITRES_PER_MILLILITRE = 1e-3
@@ -39,13 +46,56 @@ def piece_fuel_l(speed_mps: float, accel_mps2: float, duration_s: float) -> floa
 
 
 @kernel
-def trajectory_fuel_l(pieces: FloatArray, from_s: float, to_s: float) -> float:
-    """Returns the fuel (l) of a trajectory between two times, exactly; 0 if ``to_s <= from_s``."""
+def heavy_duty_rate_mlps(mass_kg: float, speed_mps: float, accel_mps2: float) -> float:
+    """Returns the fuel rate (ml/s) of a truck: f_0 + max(0, P) / (eta H), a Willans line.
+
+    The road load is ``P = v (m (a + g f_r) + rho c_w A v^2 / 2)``: Guzzella and Sciarretta, Vehicle
+    Propulsion Systems, chapters 2 and 3. 40 t at 80 km/h take 31 l per 100 km.
+    """
+    force_n = mass_kg * (accel_mps2 + GRAVITY_MPS2 * ROLLING) + AIR_KG_PER_M * speed_mps**2
+    return IDLE_MLPS + max(0.0, force_n * speed_mps) / WHEEL_J_PER_ML
+
+
+@kernel
+def heavy_duty_piece_fuel_l(
+    mass_kg: float, speed_mps: float, accel_mps2: float, duration_s: float
+) -> float:
+    """Returns the fuel (l) of a truck over a stretch of constant acceleration, exactly.
+
+    The power is a cubic in time, which Gauss' rule with two points integrates without error. A
+    truck that brakes hard enough drives its engine below ``v^2 = -m (a + g f_r) / c`` only.
+    """
+    pulls_s, load_n = duration_s, mass_kg * (accel_mps2 + GRAVITY_MPS2 * ROLLING)
+    if load_n < 0.0:  # then it brakes, and is fast enough for the engine to pull at first at most
+        turns_mps = math.sqrt(-load_n / AIR_KG_PER_M)
+        pulls_s = min(duration_s, max(0.0, (speed_mps - turns_mps) / -accel_mps2))
+    half_s = 0.5 * pulls_s
+    middle_mps = speed_mps + accel_mps2 * half_s
+    offset_mps = accel_mps2 * half_s * _GAUSS
+    fuel_ml = IDLE_MLPS * (duration_s - pulls_s)
+    for at_mps in (middle_mps - offset_mps, middle_mps + offset_mps):
+        work_w = at_mps * (load_n + AIR_KG_PER_M * at_mps * at_mps)
+        fuel_ml += half_s * (IDLE_MLPS + work_w / WHEEL_J_PER_ML)
+    return LITRES_PER_MILLILITRE * fuel_ml
+
+
+@kernel
+def trajectory_fuel_l(
+    pieces: FloatArray, from_s: float, to_s: float, model: int = 0, mass_kg: float = 1500.0
+) -> float:
+    """Returns the fuel (l) of a trajectory between two times, exactly; 0 if ``to_s <= from_s``.
+
+    ``model`` is a place in ``FUEL_MODELS``; the mass counts for trucks alone.
+    """
     total_l = 0.0
     for k in range(len(pieces)):
         start_s = max(from_s, pieces[k, TIME])
         duration_s = min(to_s, piece_end_s(pieces, k)) - start_s
         if duration_s > 0.0:
             speed_mps = pieces[k, SPEED] + pieces[k, ACCEL] * (start_s - pieces[k, TIME])
-            total_l += piece_fuel_l(speed_mps, pieces[k, ACCEL], duration_s)
+            if model == HEAVY_DUTY:
+                accel_mps2 = pieces[k, ACCEL]
+                total_l += heavy_duty_piece_fuel_l(mass_kg, speed_mps, accel_mps2, duration_s)
+            else:
+                total_l += piece_fuel_l(speed_mps, pieces[k, ACCEL], duration_s)
     return total_l

@@ -3,15 +3,22 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from coramp.vehicles.traits import CAR, Traits
+
 
 class RequestToEnter(NamedTuple):
-    """A vehicle at the start of its zone asks to enter, from ``step`` on, at this speed."""
+    """A vehicle at the start of its zone asks to enter, from ``step`` on, at this speed.
+
+    ``traits`` is what it can do; None for a vehicle that only the common limits bind.
+    """
 
     vehicle_id: str
     on_ramp: bool
     step: int
     speed_mps: float
     length_m: float
+    vehicle_type: str = CAR
+    traits: Traits | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,15 +8,22 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.events import RequestToEnter
+from coramp.vehicles.traits import Traits
+
+UNBOUND = (math.nan,) * len(Traits._fields)
 
 
 class Requests(NamedTuple):
-    """Requests as kernels read them; there may be more entries than the feed has requests."""
+    """Requests as kernels read them; there may be more entries than the feed has requests.
+
+    Rows of ``traits`` are nan for vehicles that only the common limits bind.
+    """
 
     step: IntArray
     on_ramp: BoolArray
     speed_mps: FloatArray
     length_m: FloatArray
+    traits: FloatArray
 
 
 class RequestFeed:
@@ -34,6 +41,7 @@ class RequestFeed:
             np.array([request.on_ramp for request in listed], np.bool_),
             np.array([request.speed_mps for request in listed], np.float64),
             np.array([request.length_m for request in listed], np.float64),
+            np.array([_traits_row(request) for request in listed]).reshape(-1, len(UNBOUND)),
         )
         if (np.diff(self.arrays.step) < 0).any():
             raise ValueError("requests must come in order of time")
@@ -57,10 +65,15 @@ class RequestFeed:
         arrays = self.arrays
         arrays.step[place], arrays.on_ramp[place] = request.step, request.on_ramp
         arrays.speed_mps[place], arrays.length_m[place] = numbers
+        arrays.traits[place] = _traits_row(request)
         self._list.append(request)
 
 
+def _traits_row(request: RequestToEnter) -> tuple[float, ...]:
+    return UNBOUND if request.traits is None else request.traits
+
+
 def _longer(column: Any) -> Any:
-    longer = np.zeros(2 * len(column) + 16, column.dtype)
+    longer = np.zeros((2 * len(column) + 16, *column.shape[1:]), column.dtype)
     longer[: len(column)] = column
     return longer

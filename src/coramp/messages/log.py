@@ -12,9 +12,12 @@ import polars as pl
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
+from coramp.vehicles.traits import Traits
 
-LOG_VERSION = 1
+LOG_VERSION = 2
 """Raised whenever messages get other columns, or mean something else."""
+TRAIT_COLUMNS = tuple(Traits._fields)
+"""Columns of what a vehicle can do: null where only the common limits bind it."""
 PIECES = ("piece_time_s", "piece_station_m", "piece_speed_mps", "piece_accel_mps2")
 MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
     "version": pl.Int64,
@@ -34,6 +37,8 @@ MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
     "queue_occupancy": pl.Float64,
     "passed_veh": pl.Int64,
     "green": pl.Boolean,
+    "vehicle_type": pl.String,
+    **{name: pl.Float64 for name in TRAIT_COLUMNS if name != "length_m"},
 }
 REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, END = KINDS = (
     "report",
@@ -165,7 +170,17 @@ def _request(request: RequestToEnter, step_s: float) -> dict[str, Any]:
         "stream": STREAMS[request.on_ramp],
         "speed_mps": request.speed_mps,
         "length_m": request.length_m,
+        "vehicle_type": request.vehicle_type,
+        **_traits(request),
     }
+
+
+def _traits(request: RequestToEnter) -> dict[str, Any]:
+    """Returns what a vehicle can do; what does not bind it, infinity, is left out."""
+    if request.traits is None:
+        return {}
+    known = request.traits._asdict().items()
+    return {name: value for name, value in known if np.isfinite(value)}
 
 
 def _command(command: Command, step_s: float) -> list[dict[str, Any]]:

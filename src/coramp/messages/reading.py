@@ -31,7 +31,7 @@ NEEDED = {
     REPORT: ("of_s", "station_m", "speed_mps", "std_m"),
     COMPARISON: ("of_s", "station_m", "speed_mps", "std_m"),
     READING: ("mainline_occupancy", "queue_occupancy", "passed_veh"),
-    REQUEST: ("stream", "speed_mps", "length_m"),
+    REQUEST: ("stream", "speed_mps", "length_m", "vehicle_type"),
     ENTRY: PIECES,
     COMMAND: PIECES,
     ACKNOWLEDGEMENT: ("of_s",),

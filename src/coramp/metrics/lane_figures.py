@@ -36,15 +36,18 @@ def bound_figures(
 ) -> dict[str, float | None]:
     """Returns the mean delay of all vehicles and what the lane allows; null for drivers.
 
+    It is null as well where vehicles differ in more than their lengths: the bound is one for equal
+    vehicles.
+
     The streams' delays first come, first served, are those of the arrivals alone. The bound holds
     for this run whatever its plans: where they brought a vehicle out earlier than its free
     movement, or two closer than h, that is granted.
     """
     mean_s = _known(float(np.mean(delay_s))) if len(delay_s) else None
-    if not outcome.cooperative:
+    if not outcome.cooperative or scenario.vehicles_differ:
         return {"delay_s": mean_s, **dict.fromkeys(BOUND_FIGURES)}
     passages, rules = outcome.passages, scenario.rules()
-    shortest_m = passages.length_m.min() if len(passages) else scenario.vehicle.length_m
+    shortest_m = passages.length_m.min() if len(passages) else scenario.usual_length_m
     headway_s = lane_headway_s(float(shortest_m), rules)
     arrived = Arrived(passages.scheduled_s, passages.on_ramp, passages.entry_speed_mps, free_flow_s)
     earliest_s = earliest_exits_s(*arrived[:3], packed(rules))

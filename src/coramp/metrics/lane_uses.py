@@ -10,8 +10,10 @@ from coramp.metrics.separations import LaneUse
 from coramp.records.outcome import Outcome
 
 
-def lane_uses(outcome: Outcome) -> tuple[LaneUse, LaneUse]:
+def lane_uses(outcome: Outcome, traits: FloatArray) -> tuple[LaneUse, LaneUse]:
     """Returns who used the mainline, and who the ramp with its acceleration lane.
+
+    ``traits`` has one row per vehicle.
 
     Cooperative vehicles change lanes once, as planned. SUMO's drivers are where they were seen:
     when the mainline stands, some of them overtake on the acceleration lane. So are cooperative
@@ -20,7 +22,7 @@ def lane_uses(outcome: Outcome) -> tuple[LaneUse, LaneUse]:
     passages, driven = outcome.passages, outcome.driven
     until_s = np.where(np.isnan(passages.exit_s), outcome.end_s, passages.exit_s)
     until_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
-    road = driven.first, driven.rows, passages.length_m
+    road = driven.first, driven.rows, traits
     lane = outcome.driven_lane
     if lane is not None:
         until_s = _last_seen_s(outcome)

@@ -10,6 +10,7 @@ import numpy as np
 
 from coramp._kernel import FloatArray, kernel
 from coramp.road.rules import SafetyBudget
+from coramp.vehicles.traits import CLOCK, POSITIONING, TIME_GAP
 
 TIME, STATION, SPEED, ACCEL = range(4)
 """Columns of pieces."""
@@ -40,6 +41,25 @@ def piece_under_way(pieces: FloatArray, time_s: float) -> int:
 
 
 @kernel
+def budget_of(front: FloatArray, rear: FloatArray, safety: SafetyBudget) -> SafetyBudget:
+    """Returns the budget of Eq. 1 for two vehicles, from rows of ``vehicles.traits``.
+
+    2 L_1 is the sum of their positioning errors, dt (v_X + v_Y) becomes dt_X v_X + dt_Y v_Y, and
+    the time gap is the follower's.
+    """
+    return SafetyBudget(
+        (front[POSITIONING] + rear[POSITIONING]) / 2.0,
+        front[CLOCK],
+        safety.adhesion,
+        safety.resistance,
+        rear[TIME_GAP],
+        safety.standstill_gap_m,
+        safety.execution_allowance_m,
+        rear[CLOCK] - front[CLOCK],
+    )
+
+
+@kernel
 def distance_needed_m(front_mps: float, rear_mps: float, safety: SafetyBudget) -> float:
     """Returns what Eq. 1 asks for between bumpers (m), with the optional gaps.
 
@@ -49,6 +69,7 @@ def distance_needed_m(front_mps: float, rear_mps: float, safety: SafetyBudget) -
     closing_km_h = KM_H_PER_MPS * max(0.0, rear_mps - front_mps)
     braking_m = closing_km_h**2 / (BRAKING_UNITS * (safety.adhesion + safety.resistance))
     clock_m = safety.clock_error_s * (front_mps + rear_mps)
+    clock_m += safety.follower_clock_extra_s * rear_mps
     gaps_m = safety.time_gap_s * rear_mps + safety.standstill_gap_m
     return 2.0 * safety.positioning_error_m + clock_m + braking_m + gaps_m
 
@@ -127,6 +148,7 @@ def _moments_to_look_at(
     opening_mps, opening_mps2 = front_mps - rear_mps, front_mps2 - rear_mps2
     per_square = KM_H_PER_MPS**2 / (BRAKING_UNITS * (safety.adhesion + safety.resistance))
     clock_mps = safety.clock_error_s * (front_mps2 + rear_mps2)
+    clock_mps += safety.follower_clock_extra_s * rear_mps2
     slope = opening_mps - clock_mps - safety.time_gap_s * rear_mps2
     found = np.empty(5)
     found[0], found[1] = 0.0, duration_s

@@ -17,13 +17,16 @@ ROUNDING_S = 1e-6
 
 
 @kernel
-def fuel_of_each_l(first: IntArray, rows: FloatArray, until_s: FloatArray) -> FloatArray:
-    """Returns the fuel (l) of each vehicle up to ``until_s``."""
+def fuel_of_each_l(
+    first: IntArray, rows: FloatArray, until_s: FloatArray, models: IntArray, mass_kg: FloatArray
+) -> FloatArray:
+    """Returns the fuel (l) of each vehicle up to ``until_s``, by its own model and mass."""
     fuel_l = np.zeros(len(until_s))
     for i in range(len(until_s)):
         if first[i + 1] > first[i]:
             pieces = rows[first[i] : first[i + 1]]
-            fuel_l[i] = trajectory_fuel_l(pieces, pieces[0, TIME], until_s[i])
+            start_s = pieces[0, TIME]
+            fuel_l[i] = trajectory_fuel_l(pieces, start_s, until_s[i], models[i], mass_kg[i])
     return fuel_l
 
 

@@ -12,15 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.equations.conflict_risk import conflict_severity_m2ps4
+from coramp.equations.conflict_risk import severity_of_masses_m2ps4
 from coramp.metrics.margins import (
     TIME,
+    budget_of,
     least_margin_m,
     margin_at_lane_change_m,
     piece_under_way,
     state_in_piece,
 )
 from coramp.road.rules import SafetyBudget
+from coramp.vehicles.traits import LENGTH, MASS
 
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""
@@ -34,6 +36,8 @@ FIGURES, NOTED = 7, 4
 class LaneUse(NamedTuple):
     """Stays in a lane: who uses it when. Vehicle v drives ``rows[first[v] : first[v + 1]]``.
 
+    What it can do is ``traits[v]``.
+
     Stay i is that of ``vehicle[i]``, from ``from_s[i]`` (nan: never) to ``until_s[i]``; it began
     with a lane change if ``merges[i]``. A vehicle may come to a lane more than once.
     """
@@ -41,7 +45,7 @@ class LaneUse(NamedTuple):
     vehicle: IntArray
     first: IntArray
     rows: FloatArray
-    length_m: FloatArray
+    traits: FloatArray
     from_s: FloatArray
     until_s: FloatArray
     merges: BoolArray
@@ -125,7 +129,7 @@ def driven(lane: LaneUse, stay: int) -> FloatArray:
 
 @kernel
 def _length_m(lane: LaneUse, stay: int) -> float:
-    return float(lane.length_m[lane.vehicle[stay]])
+    return float(lane.traits[lane.vehicle[stay], LENGTH])
 
 
 @kernel
@@ -157,7 +161,8 @@ def _end_pair(
     safety: SafetyBudget,
 ) -> None:
     ahead, behind, length_m = driven(lane, front), driven(lane, rear), _length_m(lane, front)
-    margin_m, least_s = least_margin_m(ahead, length_m, behind, start_s, end_s, safety)
+    pair = budget_of(lane.traits[lane.vehicle[front]], lane.traits[lane.vehicle[rear]], safety)
+    margin_m, least_s = least_margin_m(ahead, length_m, behind, start_s, end_s, pair)
     extremes[MARGIN] = min(extremes[MARGIN], margin_m)
     if margin_m < -EXACT_M:
         _note_violation(extremes, least_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
@@ -194,12 +199,15 @@ def _look_at_merge(
     if other_m < own_m:
         front, rear, equation = merging, other, MERGE_REAR
         distance_m = own_m - _length_m(lane, merging) - other_m
-    margin_m = margin_at_lane_change_m(distance_m, own_mps, other_mps, merge_angle_rad, safety)
+    own, theirs = lane.traits[lane.vehicle[merging]], lane.traits[lane.vehicle[other]]
+    pair = budget_of(own, theirs, safety)
+    margin_m = margin_at_lane_change_m(distance_m, own_mps, other_mps, merge_angle_rad, pair)
     extremes[equation] = min(extremes[equation], margin_m)
     if margin_m < -EXACT_M:
         _note_violation(extremes, now_s, lane.vehicle[front], lane.vehicle[rear], margin_m)
     along_mps = own_mps * math.cos(merge_angle_rad)
-    severity, _ = conflict_severity_m2ps4(along_mps, other_mps, distance_m)
+    masses = (own[MASS], theirs[MASS])
+    severity, _ = severity_of_masses_m2ps4(along_mps, other_mps, distance_m, *masses)
     extremes[SEVERITY] = max(extremes[SEVERITY], severity)
 
 

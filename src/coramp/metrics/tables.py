@@ -36,11 +36,18 @@ from coramp.metrics.separations import (
     lane_extremes,
 )
 from coramp.metrics.separations import VIOLATIONS as COUNT
+from coramp.metrics.types import (
+    free_flow_of_each_s,
+    fuel_models_of,
+    traits_of,
+    type_figures,
+)
 from coramp.records.outcome import LANES, Outcome
 from coramp.records.schemas import (
     DECISIONS,
     SPEEDS,
     TRAJECTORIES,
+    TYPES,
     VEHICLES,
     VIOLATIONS,
     Row,
@@ -48,6 +55,7 @@ from coramp.records.schemas import (
 )
 from coramp.scenarios.model import Scenario
 from coramp.strategies.situation import RUNGS
+from coramp.vehicles.traits import MASS, Traits
 
 Columns = Mapping[str, Any]
 """Columns of a table by name: arrays, nan for what is not there."""
@@ -76,6 +84,7 @@ class RunTables:
             "decisions": self.decisions,
             "positions": self.positions,
             "violations": self.violations,
+            "types": self.types,
             "messages": self.messages,
         }
         return {name: frame for name, frame in every.items() if frame is not None}
@@ -120,6 +129,15 @@ class RunTables:
         return None if told is None else as_frame(told, self.scenario.control.step_s)
 
     @cached_property
+    def types(self) -> pl.DataFrame:
+        """One row per type of vehicle and stream."""
+        columns = self.vehicle_columns
+        rows = type_figures(
+            self.outcome.passages, columns["delay_s"], columns["fuel_l"], columns["finished"]
+        )
+        return pl.DataFrame(rows, schema=TYPES)
+
+    @cached_property
     def violations(self) -> pl.DataFrame:
         """One row a pair that came nearer than the safe distance."""
         return violations_table(self.outcome, self.scenario, self.metrics["safety_violations"])
@@ -161,9 +179,8 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
     entered = ~np.isnan(passages.entry_s)
     until_s = outcome.until_s
     entry_s = np.where(entered, passages.entry_s, outcome.end_s)
-    free_flow_s = np.where(
-        passages.on_ramp, scenario.ramp_free_flow_s, scenario.mainline_free_flow_s
-    )
+    traits = traits_of(passages, scenario)
+    free_flow_s = free_flow_of_each_s(passages, traits, scenario)
     way_m = np.where(passages.on_ramp, -scenario.ramp.start_m, -scenario.mainline.start_m)
     travel_s = until_s - entry_s
     mean_speed_mps = np.full(len(passages), np.nan)
@@ -181,10 +198,19 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
             until_s - passages.scheduled_s - free_flow_s, np.where(finished, -np.inf, 0.0)
         ),
         "mean_speed_mps": mean_speed_mps,
-        "fuel_l": fuel_of_each_l(pieces.first, pieces.rows, until_s),
+        "fuel_l": fuel_of_each_l(
+            pieces.first, pieces.rows, until_s, fuel_models_of(passages, scenario), traits[:, MASS]
+        ),
         "finished": finished,
         "plan_error_m": passages.plan_error_m,
+        "vehicle_type": passages.vehicle_type or ("car",) * len(passages),
+        **{name: _finite_column(traits[:, k]) for k, name in enumerate(Traits._fields)},
     }
+
+
+def _finite_column(values: FloatArray) -> FloatArray:
+    """Returns a column with nan, which tables show as null, where nothing binds the vehicle."""
+    return np.where(np.isinf(values), np.nan, values)
 
 
 def _stream_names(streams: IntArray) -> list[str]:
@@ -354,7 +380,7 @@ def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> l
     rules = scenario.rules()
     return [
         lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room)
-        for lane in lane_uses(outcome)
+        for lane in lane_uses(outcome, traits_of(outcome.passages, scenario))
     ]
 
 

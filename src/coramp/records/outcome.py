@@ -7,6 +7,7 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord, Refusal
 from coramp.messages.log import Told
+from coramp.vehicles.traits import Traits
 
 LANES = ("ramp", "acceleration", "mainline")
 """Names of the lane codes of ``coordination.driven``."""
@@ -18,7 +19,8 @@ class Passages:
 
     ``merge_s`` is when a ramp vehicle changed to the mainline, minus infinity for mainline
     vehicles. ``entry_speed_mps`` is the scheduled one. ``plan_error_m`` is the largest distance
-    seen between plan and simulator, nan without a plan.
+    seen between plan and simulator, nan without a plan. ``traits`` are None for vehicles that only
+    the common limits bind; types and traits may be left out where that is so for all.
     """
 
     vehicle_id: tuple[str, ...]
@@ -30,6 +32,8 @@ class Passages:
     merge_s: FloatArray
     exit_s: FloatArray
     plan_error_m: FloatArray
+    vehicle_type: tuple[str, ...] = ()
+    traits: tuple[Traits | None, ...] = ()
 
     def __len__(self) -> int:
         return len(self.vehicle_id)

@@ -9,7 +9,7 @@ from coramp.errors import CorampError
 from coramp.records.schemas import Row
 from coramp.scenarios.model import Scenario
 
-TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations")
+TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations", "types")
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
 MESSAGES = "messages"
 """The log of messages lies beside them where it was to be kept; only the audit reads it back."""
@@ -20,8 +20,8 @@ class RunRecords:
     """What a run leaves, whether just made or read from its folder.
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
-    trajectories and decisions only of cooperative runs, and positions of the others. Violations
-    and positions are None where a coramp that kept none wrote the run, messages where they were
+    trajectories and decisions only of cooperative runs, and positions of the others. Violations,
+    positions and figures by type are None where a coramp that kept none wrote the run, messages where they were
     not to be kept, and in a run that was read.
     """
 
@@ -34,6 +34,7 @@ class RunRecords:
     positions: pl.DataFrame | None = None
     violations: pl.DataFrame | None = None
     messages: pl.DataFrame | None = None
+    types: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:

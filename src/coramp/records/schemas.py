@@ -8,7 +8,7 @@ Row = dict[str, Any]
 """One row of a table, by column."""
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 5
+RESULT_VERSION = 6
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -25,6 +25,25 @@ VEHICLES: Schema = {
     "fuel_l": pl.Float64,
     "finished": pl.Boolean,
     "plan_error_m": pl.Float64,
+    "vehicle_type": pl.String,
+    "length_m": pl.Float64,
+    "positioning_error_m": pl.Float64,
+    "clock_error_s": pl.Float64,
+    "time_gap_s": pl.Float64,
+    "top_speed_mps": pl.Float64,
+    "acceleration_mps2": pl.Float64,
+    "power_wpkg": pl.Float64,
+    "braking_mps2": pl.Float64,
+    "mass_kg": pl.Float64,
+}
+
+TYPES: Schema = {
+    "vehicle_type": pl.String,
+    "stream": pl.String,
+    "vehicles": pl.Int64,
+    "unserved": pl.Int64,
+    "delay_s": pl.Float64,
+    "fuel_l": pl.Float64,
 }
 
 TRAJECTORIES: Schema = {

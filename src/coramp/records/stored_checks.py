@@ -16,6 +16,7 @@ from coramp.records.schemas import (
     RUNS,
     SPEEDS,
     TRAJECTORIES,
+    TYPES,
     VEHICLES,
     VIOLATIONS,
     Row,
@@ -31,6 +32,7 @@ SCHEMAS: dict[str, Schema] = {
     "speeds": SPEEDS,
     "positions": TRAJECTORIES,
     "violations": VIOLATIONS,
+    "types": TYPES,
 }
 """The columns of a run's tables."""
 _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {

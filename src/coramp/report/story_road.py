@@ -179,7 +179,7 @@ def _draw_gap(axes: Axes, scene: Scene) -> None:
         gid="required-gap",
         label=f"required gap, {required_m:.2f} m",
     )
-    length_m = scene.scenario.vehicle.length_m
+    length_m = scene.scenario.usual_length_m
     axes.add_patch(
         Rectangle(
             (scene.place_m - length_m, -HALF_WIDTH),
@@ -198,7 +198,7 @@ def _draw_gap(axes: Axes, scene: Scene) -> None:
 def _draw_vehicle(axes: Axes, scene: Scene, name: str, at: tuple[float, float]) -> None:
     """Draws a vehicle as a box that ends at its front bumper."""
     station_m, across = at
-    length_m, roles = scene.scenario.vehicle.length_m, scene.roles.get(name, ())
+    length_m, roles = scene.scenario.usual_length_m, scene.roles.get(name, ())
     colour, _, _ = look_in(scene, name)
     axes.add_patch(
         Rectangle(
@@ -220,7 +220,7 @@ def _name(
     """Writes a vehicle's name above the mainline, or below the ramp, and whether it is X or Y."""
     station_m, across = at
     roles, colour = scene.roles.get(name, ()), look_in(scene, name)[0]
-    middle_m = station_m - 0.5 * scene.scenario.vehicle.length_m
+    middle_m = station_m - 0.5 * scene.scenario.usual_length_m
     foot = across + side * (HALF_LANE + 0.1 + TIER * tier)
     if tier:
         axes.plot([middle_m] * 2, [across + side * HALF_LANE, foot], color=colour, linewidth=0.5)

@@ -106,7 +106,7 @@ class Scene:
         rear_m, front_m = self.decision["rear_station_m"], self.decision["front_station_m"]
         return (
             -math.inf if rear_m is None else float(rear_m),
-            math.inf if front_m is None else float(front_m) - self.scenario.vehicle.length_m,
+            math.inf if front_m is None else float(front_m) - self.scenario.usual_length_m,
         )
 
 

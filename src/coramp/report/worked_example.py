@@ -128,7 +128,7 @@ def _enlarge(axes: Axes, planned: PlannedSnapshot, free: Free) -> None:
 
 def lengths_of(planned: PlannedSnapshot) -> dict[str, float]:
     """Returns each vehicle's length in m."""
-    usual_m = planned.scenario.vehicle.length_m
+    usual_m = planned.scenario.usual_length_m
     return {v.id: v.length_m or usual_m for v in planned.snapshot.vehicles}
 
 

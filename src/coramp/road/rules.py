@@ -34,7 +34,8 @@ class SafetyBudget(NamedTuple):
     ``time_gap_s`` is an optional addition of ``time_gap_s`` times the follower's speed, and
     ``standstill_gap_m`` one of so many metres at every speed; both are 0 in the paper.
     ``execution_allowance_m`` is what planning adds for each pair so that the driven
-    positions keep Eq. 1; it is no part of the safe distance itself.
+    positions keep Eq. 1; it is no part of the safe distance itself. ``clock_error_s`` is that of
+    the vehicle in front; the follower's is larger by ``follower_clock_extra_s``.
     """
 
     positioning_error_m: float
@@ -44,6 +45,7 @@ class SafetyBudget(NamedTuple):
     time_gap_s: float
     standstill_gap_m: float
     execution_allowance_m: float
+    follower_clock_extra_s: float = 0.0
 
 
 class MotionLimits(NamedTuple):
@@ -84,13 +86,25 @@ class Control(NamedTuple):
     create_from_nose: bool
 
 
+class Traffic(NamedTuple):
+    """How unlike vehicles are: whether planners must look at each one's limits.
+
+    ``extra_safe_distance_m`` is by how much more than the common budget two vehicles may ask for at
+    most, at any speed.
+    """
+
+    differs: bool = False
+    extra_safe_distance_m: float = 0.0
+
+
 class Rules(NamedTuple):
-    """Everything a planner is bound by."""
+    """Everything a planner is bound by. Vehicles may be bound by less of their own (``vehicles``)."""
 
     road: Road
     safety: SafetyBudget
     motion: MotionLimits
     control: Control
+    traffic: Traffic = Traffic()
 
 
 def packed(rules: Rules) -> FloatArray:
@@ -104,7 +118,8 @@ def unpacked(numbers: FloatArray) -> Rules:
     n = numbers
     return Rules(
         Road(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10]),
-        SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16], n[17]),
-        MotionLimits(n[18], n[19], n[20], n[21], n[22], n[23], n[24], n[25], n[26]),
-        Control(n[27], n[28], n[29], n[30] != 0.0, n[31] != 0.0),
+        SafetyBudget(n[11], n[12], n[13], n[14], n[15], n[16], n[17], n[18]),
+        MotionLimits(n[19], n[20], n[21], n[22], n[23], n[24], n[25], n[26], n[27]),
+        Control(n[28], n[29], n[30], n[31] != 0.0, n[32] != 0.0),
+        Traffic(n[33] != 0.0, n[34]),
     )

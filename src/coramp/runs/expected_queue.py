@@ -17,7 +17,9 @@ def demand_above_limit(spec: RunSpec) -> str | None:
         return None
     streams = (scenario.mainline.flows_veh_h, scenario.ramp.flows_veh_h)
     demand_veh_h = max(map(sum, zip(*streams, strict=True)))
-    limit_veh_h = lane_limit_veh_h(lane_headway_s(scenario.vehicle.length_m, scenario.rules()))
+    if scenario.vehicles_differ:
+        return None
+    limit_veh_h = lane_limit_veh_h(lane_headway_s(scenario.usual_length_m, scenario.rules()))
     if demand_veh_h <= limit_veh_h:
         return None
     return (

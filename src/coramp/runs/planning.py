@@ -49,7 +49,7 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))
     arrivals = [
-        Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.vehicle.length_m)
+        Arrival(v.id, v.stream == "ramp", 0, v.speed_mps, v.length_m or scenario.usual_length_m)
         for v in vehicles
     ]
     coordinator = Coordinator(

@@ -7,6 +7,7 @@ from coramp.equations.gaps import least_acceleration_mps2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.errors import CorampError
+from coramp.scenarios.vehicle_checks import vehicle_problems
 from coramp.strategies.parameters import wrong_settings, wrong_together
 from coramp.strategies.registry import strategy_named
 
@@ -22,6 +23,7 @@ def problems_of(scenario: "Scenario") -> list[str]:
     problems = [*_speed_problems(scenario), *_place_problems(scenario), *_flow_problems(scenario)]
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
     problems += [*_motion_problems(scenario), *_driver_problems(scenario)]
+    problems += vehicle_problems(scenario)
     return problems or _planning_problems(scenario)
 
 
@@ -262,7 +264,7 @@ def decision_station_range_m(scenario: "Scenario") -> tuple[float, float]:
     least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
     behind_m = (
         lag_m(v0, ramp_mps, least)
-        + scenario.vehicle.length_m
+        + scenario.longest_m
         + merge_clearance_m(road, safety)
         + v0 * control.step_s
     )

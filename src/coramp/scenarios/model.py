@@ -20,9 +20,11 @@ from pydantic import (
 from coramp.equations.conflict_risk import GRAVITY_MPS2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import braking_distance_m
-from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget
+from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
+from coramp.scenarios.vehicle_types import VehicleType
 from coramp.strategies.parameters import Value
+from coramp.vehicles.traits import CAR, Traits
 
 FASTEST_MPS = 60.0
 NEAREST_STOP_M = -1.0
@@ -52,6 +54,10 @@ Flow = Annotated[float, Field(ge=0.0)]
 Headway = Annotated[float, Field(gt=0.0, le=60.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+def _one_or_list(value: Any) -> str:
+    return "(list)" if isinstance(value, list | tuple) else "(one)"
 
 
 class Stream(Model):
@@ -101,9 +107,17 @@ class Ramp(Stream):
 
 
 class Vehicle(Model):
-    """All vehicles are alike; an explicit arrival may be longer or shorter."""
+    """All vehicles are cars and alike; an explicit arrival may be longer or shorter."""
 
     length_m: Annotated[float, Field(gt=0.0, le=40.0)] = 5.0
+
+
+Vehicles = Annotated[
+    Annotated[Vehicle, Tag("(one)")]
+    | Annotated[tuple[VehicleType, ...], Field(strict=False, min_length=1), Tag("(list)")],
+    Discriminator(_one_or_list),
+]
+"""Either ``[vehicle]``, where all are alike, or ``[[vehicle]]``, a table for each type."""
 
 
 class Safety(Model):
@@ -150,10 +164,6 @@ class SpeedFactor(Model):
     high: Annotated[float, Field(gt=0.0, le=2.0)]
 
 
-def _one_or_list(value: Any) -> str:
-    return "(list)" if isinstance(value, list | tuple) else "(one)"
-
-
 DriverGap = Annotated[float, Field(gt=0.0, le=10.0)]
 DriverGaps = Annotated[
     Annotated[DriverGap, Tag("(one)")]
@@ -188,12 +198,17 @@ class Drivers(Model):
 
 
 class ExplicitArrival(Model):
-    """One vehicle of a given list of arrivals; times lie on the step grid."""
+    """One vehicle of a given list of arrivals; times lie on the step grid.
+
+    Left out, ``type`` is the first type of the scenario, and ``top_speed_mps`` the mean of its own.
+    """
 
     stream: Literal["mainline", "ramp"]
     time_s: NotNegative
     speed_mps: Speed
     length_m: Annotated[float, Field(gt=0.0, le=40.0)] | None = None
+    type: str | None = None
+    top_speed_mps: Speed | None = None
 
 
 class Simulation(Model):
@@ -213,7 +228,7 @@ class Scenario(Model):
     description: str = ""
     mainline: Mainline
     ramp: Ramp
-    vehicle: Vehicle = Vehicle()
+    vehicle: Vehicles = Vehicle()
     safety: Safety = Safety()
     motion: Motion = Motion()
     control: Controller = Controller()
@@ -239,6 +254,50 @@ class Scenario(Model):
         if problems := problems_of(self):
             raise ValueError("\n".join(problems))
         return self
+
+    @property
+    def vehicle_types(self) -> tuple[VehicleType, ...]:
+        """The types of vehicles; one car where all are alike."""
+        if isinstance(self.vehicle, Vehicle):
+            return (VehicleType(name=CAR, share=1.0, length_m=self.vehicle.length_m),)
+        return self.vehicle
+
+    def type_named(self, name: str) -> VehicleType:
+        """Returns the type of that name, the first one for one that the scenario does not have."""
+        return next((t for t in self.vehicle_types if t.name == name), self.vehicle_types[0])
+
+    @property
+    def usual_length_m(self) -> float:
+        """The length (m) of the type that most vehicles of the mainline have."""
+        return max(self.vehicle_types, key=lambda kind: kind.share_of(False)).length_m
+
+    @property
+    def longest_m(self) -> float:
+        """The length (m) of the longest type."""
+        return max(kind.length_m for kind in self.vehicle_types)
+
+    @property
+    def vehicles_differ(self) -> bool:
+        """Whether planners must look at each vehicle's own limits, not at its length alone."""
+        return not all(kind.is_usual for kind in self.vehicle_types)
+
+    def usual_traits(self, length_m: float) -> Traits:
+        """Returns the traits of a vehicle that only the common limits bind."""
+        safety = self.safety
+        return Traits(length_m, safety.positioning_error_m, safety.clock_error_s, safety.time_gap_s)
+
+    @property
+    def _traffic(self) -> Traffic:
+        """How unlike vehicles are, and by how much more than usual two may need of each other."""
+        if not self.vehicles_differ:
+            return Traffic()
+        usual, fastest_mps = self.usual_traits(0.0), FASTEST_MPS
+        own = [kind.traits(usual, math.inf) for kind in self.vehicle_types]
+        errors_m = max(t.positioning_error_m for t in own) - usual.positioning_error_m
+        clock_s = max(t.clock_error_s for t in own) - usual.clock_error_s
+        gap_s = max(t.time_gap_s for t in own) - usual.time_gap_s
+        seconds = 2.0 * max(0.0, clock_s) + max(0.0, gap_s)
+        return Traffic(True, 2.0 * max(0.0, errors_m) + seconds * fastest_mps)
 
     def rules(self) -> Rules:
         """Returns what planners are bound by."""
@@ -268,6 +327,7 @@ class Scenario(Model):
                 gap_at_front=self.control.gap_position == "front",
                 create_from_nose=self.control.gap_creation_start == "nose",
             ),
+            self._traffic,
         )
 
     @property

@@ -49,7 +49,7 @@ class Snapshot(Model):
 
     def length_m(self, vehicle: SnapshotVehicle) -> float:
         """Returns a vehicle's own length, or the scenario's."""
-        return vehicle.length_m or self.road().vehicle.length_m
+        return vehicle.length_m or self.road().usual_length_m
 
 
 def load_snapshot(name: str) -> Snapshot:
@@ -104,7 +104,7 @@ def _distance_problems(snapshot: Snapshot, scenario: Scenario) -> list[str]:
         lane = [vehicle for vehicle in snapshot.vehicles if vehicle.stream == stream]
         lane.sort(key=lambda vehicle: -vehicle.station_m)
         for front, rear in pairwise(lane):
-            length_m = front.length_m or scenario.vehicle.length_m
+            length_m = front.length_m or scenario.usual_length_m
             gap_m = front.station_m - length_m - rear.station_m
             needed_m = safe_distance_m(front.speed_mps, rear.speed_mps, safety)
             if gap_m < 0.0:

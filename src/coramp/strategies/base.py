@@ -246,7 +246,8 @@ class Strategy(Decider, Protocol):
 
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
     by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
-    for one that needs a signal and detectors on the ramp, in SUMO. ``entry_policy`` is what it
+    for one that needs a signal and detectors on the ramp, in SUMO. ``vehicles_may_differ`` is True
+    for one that plans with vehicles' own limits; others are refused where vehicles differ. ``entry_policy`` is what it
     asks of entries, if anything: see ``entry_policy_of``. One whose parameters must fit
     together has a method ``problems()``, which returns lines ``parameter: what is wrong; what is
     allowed``.
@@ -276,6 +277,11 @@ def steps_of_period(period_s: float, step_s: float) -> int:
 def held_period_s(period_s: float, rules: Rules) -> float:
     """Returns the time (s) between two decisions of a strategy with this period."""
     return steps_of_period(period_s, rules.control.step_s) * rules.control.step_s
+
+
+def vehicles_may_differ(strategy: Decider | type[Strategy]) -> bool:
+    """Returns whether a strategy looks at each vehicle's own limits, not at its length alone."""
+    return bool(getattr(strategy, "vehicles_may_differ", False))
 
 
 def is_metered(strategy: Decider | type[Strategy]) -> bool:

@@ -138,7 +138,7 @@ def come_late_by(
         rules,
     ):
         return no_merge()
-    if not delay_followers(fleet, proposal, situation, rules):
+    if not delay_followers(fleet, proposal, situation.subject, situation.from_s, rules):
         return no_merge()
     unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
     if unsafe >= 0:
@@ -161,10 +161,10 @@ def too_near_ahead(
             continue
         margin_m = pair_margin_m(
             proposed(proposal, 0),
-            fleet.length_m[row],
+            fleet.traits[row],
             proposal.merge_time_s[0],
             committed(fleet, other),
-            fleet.length_m[other],
+            fleet.traits[other],
             fleet.merge_time_s[other],
             situation.from_s,
             rules,
@@ -218,27 +218,29 @@ def with_approach(situation: Situation, approach: FloatArray, rules: Rules) -> S
 
 
 @kernel
-def delay_followers(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> bool:
+def delay_followers(
+    fleet: Fleet, proposal: Proposal, subject: int, from_s: float, rules: Rules
+) -> bool:
     """Adds those behind the subject on the ramp that would come too near to who is before them."""
-    leader = situation.subject
+    leader = subject
     while True:
-        follower = next_behind_on_ramp(fleet, leader, situation.from_s)
+        follower = next_behind_on_ramp(fleet, leader, from_s)
         if follower < 0:
             return True
         entry = entry_of(proposal, leader)
         margin_m = pair_margin_m(
             proposed(proposal, entry),
-            fleet.length_m[leader],
+            fleet.traits[leader],
             proposal.merge_time_s[entry],
             committed(fleet, follower),
-            fleet.length_m[follower],
+            fleet.traits[follower],
             math.inf,
-            situation.from_s,
+            from_s,
             rules,
         )
         if margin_m >= rules.safety.execution_allowance_m - ROUNDING_M:
             return True
         stop_m = stop_of_m(committed(fleet, follower))
-        if not propose_stop(fleet, proposal, follower, stop_m, situation.from_s, rules):
+        if not propose_stop(fleet, proposal, follower, stop_m, from_s, rules):
             return False
         leader = follower

@@ -67,7 +67,7 @@ class LeastEffort:
         _add(proposal, situation.subject, pieces, merge_s)
         if not self._fall_back(fleet, proposal, situation, gap, back_m, merge_s, rules):
             return None, proposal
-        if not delay_followers(fleet, proposal, situation, rules):
+        if not delay_followers(fleet, proposal, situation.subject, situation.from_s, rules):
             return None, proposal
         if find_unsafe_pair(fleet, proposal, situation.from_s, rules)[0] >= 0:
             return None, proposal

@@ -25,6 +25,7 @@ from coramp.strategies.situation import (
     gaps_by_preference,
     ramp_neighbours,
 )
+from coramp.strategies.unequal_ladder import plan_unequal_mainline
 from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
 
 
@@ -88,7 +89,10 @@ class MainlinePriority:
     name: ClassVar[str] = "mainline-priority"
     summary: ClassVar[str] = "the paper's method: the ramp vehicle picks, or is made, a gap"
     cooperative: ClassVar[bool] = True
+    vehicles_may_differ: ClassVar[bool] = True
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the ladder's answer for the first subject."""
+        if view.rules.traffic.differs:
+            return decide_first(plan_unequal_mainline, view, memory)
         return decide_first(plan_with_mainline_priority, view, memory)

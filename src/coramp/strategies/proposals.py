@@ -191,6 +191,7 @@ def largest_safe_distance_m(rules: Rules) -> float:
         safe_distance_m(fastest_mps, fastest_mps, rules.safety)
         + braking_distance_m(fastest_mps, rules.safety.adhesion, rules.safety.resistance)
         + rules.safety.execution_allowance_m
+        + rules.traffic.extra_safe_distance_m
     )
 
 
@@ -226,10 +227,10 @@ def find_unsafe_pair(
                     continue
             margin_m = pair_margin_m(
                 one,
-                fleet.length_m[row],
+                fleet.traits[row],
                 one_merge_s,
                 trajectory_under(fleet, proposal, other_row),
-                fleet.length_m[other_row],
+                fleet.traits[other_row],
                 other_merge_s,
                 from_s,
                 rules,

@@ -34,6 +34,7 @@ from coramp.strategies.situation import (
     gap_of_free_movement,
     ramp_neighbours,
 )
+from coramp.strategies.unequal_ladder import plan_unequal_ramp
 from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, proposed
 
 
@@ -147,7 +148,10 @@ class RampPriority:
     name: ClassVar[str] = "ramp-priority"
     summary: ClassVar[str] = "the paper's second method: the mainline opens a gap at the merge"
     cooperative: ClassVar[bool] = True
+    vehicles_may_differ: ClassVar[bool] = True
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the answer for the first subject."""
+        if view.rules.traffic.differs:
+            return decide_first(plan_unequal_ramp, view, memory)
         return decide_first(plan_with_ramp_priority, view, memory)

@@ -21,11 +21,12 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     trajectory_under,
 )
+from coramp.vehicles.traits import own_rules
 
 
 @kernel
 def propose_stop(
-    fleet: Fleet, proposal: Proposal, row: int, stop_m: float, from_s: float, rules: Rules
+    fleet: Fleet, proposal: Proposal, row: int, stop_m: float, from_s: float, common_rules: Rules
 ) -> bool:
     """Adds a ramp vehicle that goes on to a stop at ``stop_m``, braking before that if it must.
 
@@ -36,6 +37,7 @@ def propose_stop(
     entry = proposal.size[0]
     if is_full(proposal):
         return False
+    rules = own_rules(fleet.traits[row], common_rules, True)
     before = committed(fleet, row)
     station_m, speed_mps = station_and_speed(before, from_s)
     out = proposal.pieces[entry]
@@ -68,7 +70,7 @@ def longest_wait_s(rules: Rules) -> float:
 
 @kernel
 def propose_place_ahead(
-    fleet: Fleet, proposal: Proposal, row: int, stop_m: float, from_s: float, rules: Rules
+    fleet: Fleet, proposal: Proposal, row: int, stop_m: float, from_s: float, common_rules: Rules
 ) -> bool:
     """Adds a ramp vehicle that goes on to a stop further ahead without touching who is behind it.
 
@@ -78,13 +80,14 @@ def propose_place_ahead(
     entry = proposal.size[0]
     if is_full(proposal):
         return False
+    rules = own_rules(fleet.traits[row], common_rules, True)
     before = committed(fleet, row)
     out = proposal.pieces[entry]
     n = approach_without_stop(before, from_s, rules.road, rules.motion, out)
     n = append_stop(out, n, stop_m, rules.motion.stop_mps2)
     if _safe_on_ramp(fleet, proposal, row, out[:n], from_s, rules):
         _add_stop(proposal, row, n)
-    elif not propose_stop(fleet, proposal, row, stop_m, from_s, rules):
+    elif not propose_stop(fleet, proposal, row, stop_m, from_s, common_rules):
         return False
     behind = next_behind_on_ramp(fleet, row, from_s)
     if behind >= 0 and not _safe_on_ramp(
@@ -140,10 +143,10 @@ def _safe_on_ramp(
             continue
         margin_m = pair_margin_m(
             ahead,
-            fleet.length_m[other],
+            fleet.traits[other],
             merge_s,
             pieces,
-            fleet.length_m[row],
+            fleet.traits[row],
             math.inf,
             from_s,
             rules,

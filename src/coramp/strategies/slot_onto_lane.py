@@ -300,7 +300,7 @@ def merges_safely(
     _, merge_m = propose_merge(proposal, situation.subject, approach, accel_mps2, rules)
     if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
         return False
-    if not delay_followers(fleet, proposal, situation, rules):
+    if not delay_followers(fleet, proposal, situation.subject, situation.from_s, rules):
         return False
     if not fall_back_behind(fleet, proposal, situation, place.first_behind, place.slot_m, rules):
         return False

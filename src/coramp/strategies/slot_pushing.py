@@ -101,10 +101,10 @@ def keeps_behind(
     """Returns whether a mainline vehicle on these pieces keeps its distance to the one ahead."""
     margin_m = pair_margin_m(
         trajectory_under(fleet, proposal, ahead),
-        fleet.length_m[ahead],
+        fleet.traits[ahead],
         merge_time_under_s(fleet, proposal, ahead),
         pieces,
-        fleet.length_m[row],
+        fleet.traits[row],
         fleet.merge_time_s[row],
         from_s,
         rules,

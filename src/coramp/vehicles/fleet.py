@@ -8,8 +8,9 @@ import numpy as np
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
 from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
-from coramp.road.rules import Rules
+from coramp.road.rules import Road, Rules, SafetyBudget
 from coramp.vehicles.separation import smallest_margin_m
+from coramp.vehicles.traits import LENGTH, pair_safety
 
 
 class Fleet(NamedTuple):
@@ -17,7 +18,7 @@ class Fleet(NamedTuple):
 
     Row i's trajectory is ``pieces[first_piece[i] : first_piece[i] + piece_count[i]]``.
     ``merge_time_s`` is minus infinity for mainline vehicles, infinity for a ramp vehicle whose
-    merge is not committed. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
+    merge is not committed. ``traits`` are rows of ``vehicles.traits``. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
     trajectory.
     """
 
@@ -28,6 +29,7 @@ class Fleet(NamedTuple):
     merge_time_s: FloatArray
     lowest_m: FloatArray
     highest_m: FloatArray
+    traits: FloatArray
     live: IntArray
 
 
@@ -114,6 +116,13 @@ def merge_time_under_s(fleet: Fleet, proposal: Proposal, row: int) -> float:
     return float(fleet.merge_time_s[row])
 
 
+class PairSafety(NamedTuple):
+    """The budgets of Eq. 1 for two vehicles: if the one leads, and if the other does."""
+
+    one_leads: SafetyBudget
+    other_leads: SafetyBudget
+
+
 @kernel
 def ordered_margin_m(
     one: FloatArray,
@@ -122,7 +131,8 @@ def ordered_margin_m(
     other_length_m: float,
     start_s: float,
     end_s: float,
-    rules: Rules,
+    road: Road,
+    safety: PairSafety,
 ) -> float:
     """Returns the smallest margin over Eq. 1 (m) of two vehicles in one lane, whichever leads.
 
@@ -131,11 +141,11 @@ def ordered_margin_m(
     one_m, _ = station_and_speed(one, start_s)
     other_m, _ = station_and_speed(other, start_s)
     if one_m >= other_m:
-        end_s = min(end_s, time_at_station(one, rules.road.mainline_end_m))
-        margin_m, _ = smallest_margin_m(one, one_length_m, other, start_s, end_s, rules.safety)
+        end_s = min(end_s, time_at_station(one, road.mainline_end_m))
+        margin_m, _ = smallest_margin_m(one, one_length_m, other, start_s, end_s, safety.one_leads)
         return margin_m
-    end_s = min(end_s, time_at_station(other, rules.road.mainline_end_m))
-    margin_m, _ = smallest_margin_m(other, other_length_m, one, start_s, end_s, rules.safety)
+    end_s = min(end_s, time_at_station(other, road.mainline_end_m))
+    margin_m, _ = smallest_margin_m(other, other_length_m, one, start_s, end_s, safety.other_leads)
     return margin_m
 
 
@@ -146,7 +156,8 @@ def merge_margin_m(
     other: FloatArray,
     other_length_m: float,
     merge_s: float,
-    rules: Rules,
+    road: Road,
+    safety: SafetyBudget,
 ) -> float:
     """Returns the margin (m) over Eq. 15 or 16 of a vehicle to another, when it merges."""
     merging_m, merging_mps = station_and_speed(merging, merge_s)
@@ -155,17 +166,17 @@ def merge_margin_m(
         distance_m = other_m - other_length_m - merging_m
     else:
         distance_m = merging_m - merging_length_m - other_m
-    along_mps = merging_speed_along_mps(merging_mps, rules.road.merge_angle_rad)
-    return distance_m - merge_distance_m(along_mps, other_mps, rules.safety)
+    along_mps = merging_speed_along_mps(merging_mps, road.merge_angle_rad)
+    return distance_m - merge_distance_m(along_mps, other_mps, safety)
 
 
 @kernel
 def pair_margin_m(
     one: FloatArray,
-    one_length_m: float,
+    one_traits: FloatArray,
     one_merge_s: float,
     other: FloatArray,
-    other_length_m: float,
+    other_traits: FloatArray,
     other_merge_s: float,
     from_s: float,
     rules: Rules,
@@ -173,29 +184,36 @@ def pair_margin_m(
     """Returns the smallest margin (m) of two vehicles from ``from_s`` on, while in one lane.
 
     Over Eq. 1 on the ramp with its acceleration lane until the first of them merges and on the
-    mainline once both are there, and over Eq. 15 or 16 at the moment of that merge.
+    mainline once both are there, and over Eq. 15 or 16 at the moment of that merge. Each vehicle
+    counts with its own errors, and the follower with its own time gap.
     """
+    road = rules.road
+    one_length_m, other_length_m = one_traits[LENGTH], other_traits[LENGTH]
+    safety = PairSafety(
+        pair_safety(one_traits, other_traits, rules.safety),
+        pair_safety(other_traits, one_traits, rules.safety),
+    )
     smallest_m = math.inf
     first_merge_s, last_merge_s = min(one_merge_s, other_merge_s), max(one_merge_s, other_merge_s)
     if first_merge_s > from_s:
         smallest_m = ordered_margin_m(
-            one, one_length_m, other, other_length_m, from_s, first_merge_s, rules
+            one, one_length_m, other, other_length_m, from_s, first_merge_s, road, safety
         )
     if math.isinf(last_merge_s) and last_merge_s > 0.0:
         return smallest_m
     together_s = max(from_s, last_merge_s)
     on_mainline_m = ordered_margin_m(
-        one, one_length_m, other, other_length_m, together_s, math.inf, rules
+        one, one_length_m, other, other_length_m, together_s, math.inf, road, safety
     )
     smallest_m = min(smallest_m, on_mainline_m)
     if last_merge_s >= from_s:
         if one_merge_s >= other_merge_s:
             at_merge_m = merge_margin_m(
-                one, one_length_m, other, other_length_m, last_merge_s, rules
+                one, one_length_m, other, other_length_m, last_merge_s, road, safety.one_leads
             )
         else:
             at_merge_m = merge_margin_m(
-                other, other_length_m, one, one_length_m, last_merge_s, rules
+                other, other_length_m, one, one_length_m, last_merge_s, road, safety.one_leads
             )
         smallest_m = min(smallest_m, at_merge_m)
     return smallest_m

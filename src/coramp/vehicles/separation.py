@@ -109,6 +109,7 @@ def _smallest_within_pieces(
     slope = (
         opening_mps
         - safety.clock_error_s * (front_mps2 + rear_mps2)
+        - safety.follower_clock_extra_s * rear_mps2
         - safety.time_gap_s * rear_mps2
     )
     curvature = 0.5 * opening_mps2

@@ -95,4 +95,6 @@ def passages_of(
         merge_s,
         exit_s,
         plan_error_m,
+        tuple(arrival.vehicle_type for arrival in arrivals),
+        tuple(arrival.traits for arrival in arrivals),
     )

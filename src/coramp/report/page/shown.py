@@ -115,7 +115,7 @@ def _pieces(
 def _lengths_m(run: RunRecords, ids: list[str]) -> list[float]:
     arrivals = arrivals_of(run.scenario, run.summary["seed"])
     known = {arrival.vehicle_id: arrival.length_m for arrival in arrivals}
-    return [known.get(name, run.scenario.vehicle.length_m) for name in ids]
+    return [known.get(name, run.scenario.usual_length_m) for name in ids]
 
 
 def _decision(

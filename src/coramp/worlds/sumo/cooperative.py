@@ -104,7 +104,7 @@ class CooperativePlant:
         self._session.add(
             arrival.vehicle_id,
             "ramp" if arrival.on_ramp else "mainline",
-            cooperative_type(arrival.length_m),
+            cooperative_type(arrival),
             step,
             arrival.speed_mps,
         )

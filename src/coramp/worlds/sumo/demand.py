@@ -1,30 +1,47 @@
 """Arrivals as a SUMO route file: an explicit list with exact times."""
 
+import math
 from collections.abc import Sequence
 
 from coramp.coordination.plant import Arrival
-from coramp.scenarios.model import Drivers, Scenario
+from coramp.scenarios.model import Drivers, Scenario, Vehicle
+from coramp.vehicles.traits import CAR
 from coramp.worlds.sumo.traits import Traits
 
 FASTEST_COMMAND_MPS = 100.0
 """The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
+PROFILE_MPS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
+"""Speeds at which a driver's acceleration is given to SUMO, which interpolates."""
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
   <route id="ramp" edges="{ramp} merge downstream"/>"""
 
 
-def cooperative_type(length_m: float) -> str:
-    """Returns the name of the vehicle type of cooperative vehicles of a length."""
-    return f"cooperative-{length_m!r}"
+def cooperative_type(arrival: Arrival) -> str:
+    """Returns the name of a cooperative vehicle's type in SUMO: by length, and type if not a car."""
+    kind = "" if arrival.vehicle_type == CAR else f"{arrival.vehicle_type}-"
+    return f"cooperative-{kind}{arrival.length_m!r}"
 
 
-def cooperative_types(arrivals: Sequence[Arrival]) -> list[str]:
-    """Returns one vehicle type for each length; speeds are commanded, so only size matters."""
-    lengths_m = sorted({arrival.length_m for arrival in arrivals})
+def cooperative_types(scenario: Scenario, arrivals: Sequence[Arrival]) -> list[str]:
+    """Returns one vehicle type for each kind and length.
+
+    Speeds are commanded, so that only size matters for motion. Class and mass are for SUMO's own
+    outputs, emissions among them, and for its window.
+    """
+    seen = {(a.length_m, cooperative_type(a)): a for a in arrivals}
     return [
-        f'  <vType id="{cooperative_type(length_m)}" length="{length_m!r}" '
-        f'maxSpeed="{FASTEST_COMMAND_MPS!r}" speedFactor="1" speedDev="0"/>'
-        for length_m in lengths_m
+        f'  <vType id="{name}" length="{length_m!r}" maxSpeed="{FASTEST_COMMAND_MPS!r}" '
+        f'speedFactor="1" speedDev="0"{_class(scenario, seen[length_m, name])}/>'
+        for length_m, name in sorted(seen)
     ]
+
+
+def _class(scenario: Scenario, arrival: Arrival) -> str:
+    """Returns class and mass of a vehicle of a type of the scenario's own, nothing for others."""
+    if isinstance(scenario.vehicle, Vehicle):
+        return ""
+    kind = scenario.type_named(arrival.vehicle_type)
+    return f' vClass="{kind.sumo_class}" mass="{kind.mass_kg!r}"'
 
 
 def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_vehicles: bool) -> str:
@@ -35,10 +52,9 @@ def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_veh
     vehicles = []
     if with_vehicles:
         vehicles = [
-            _vehicle(a, cooperative_type(a.length_m), a.speed_mps, scenario.control.step_s)
-            for a in arrivals
+            _vehicle(a, cooperative_type(a), a.speed_mps, scenario.control.step_s) for a in arrivals
         ]
-    return _file(cooperative_types(arrivals), vehicles)
+    return _file(cooperative_types(scenario, arrivals), vehicles)
 
 
 def driver_routes(
@@ -61,18 +77,48 @@ def driver_routes(
             wish_mps = entry_mps = arrival.speed_mps
             name = f"driver-{arrival.vehicle_id}"
         else:
-            wish_mps = scenario.mainline.speed_mps
+            wish_mps = min(scenario.mainline.speed_mps, _top_mps(arrival))
             common_mps = scenario.ramp.speed_mps if arrival.on_ramp else wish_mps
             entry_mps = min(arrival.speed_mps, common_mps * (own.speed_factor or 1.0))
             name = f"driver-{arrival.length_m!r}"
             if len(drivers.taus_s) > 1:
                 name += f"-{own.tau_s!r}"
+        if arrival.traits is not None and not math.isinf(arrival.traits.top_speed_mps):
+            name += f"-{arrival.vehicle_id}"  # each draws a top speed of its own
+        elif arrival.vehicle_type != CAR:
+            name += f"-{arrival.vehicle_type}"
         size = f'length="{arrival.length_m!r}" {_wish(drivers, wish_mps)}'
-        types[name] = f'  <vType id="{name}" {size} {_manners(drivers, own.tau_s)}/>'
+        manners = f"{_manners(drivers, own.tau_s)}{_ability(drivers, arrival)}"
+        types[name] = f'  <vType id="{name}" {size} {manners}{_class(scenario, arrival)}/>'
         vehicles.append(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
         )
     return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
+
+
+def _top_mps(arrival: Arrival) -> float:
+    return math.inf if arrival.traits is None else arrival.traits.top_speed_mps
+
+
+def _ability(drivers: Drivers, arrival: Arrival) -> str:
+    """Returns how a driver's vehicle accelerates where its type says so; else it is as SUMO has it.
+
+    SUMO takes a profile of speeds (m/s) and accelerations for a vehicle of limited power.
+    """
+    traits = arrival.traits
+    own_mps2 = math.inf if traits is None else traits.acceleration_mps2
+    accel_mps2 = min(own_mps2, drivers.accel_mps2 or math.inf)
+    told = "" if math.isinf(accel_mps2) else f' accel="{accel_mps2!r}"'
+    if traits is None:
+        return told
+    if not math.isinf(traits.power_wpkg):
+        points = [
+            (speed, min(traits.acceleration_mps2, traits.power_wpkg / max(speed, 0.1)))
+            for speed in PROFILE_MPS
+        ]
+        profile = ",".join(f"{speed:g} {min(accel, 10.0):.3f}" for speed, accel in points)
+        told += f' maxAccelProfile="{profile}" desAccelProfile="{profile}"'
+    return told
 
 
 def _wish(drivers: Drivers, wish_mps: float) -> str:
@@ -85,10 +131,9 @@ def _wish(drivers: Drivers, wish_mps: float) -> str:
 def _manners(drivers: Drivers, tau_s: float) -> str:
     model = drivers.car_following
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
-    accel = "" if drivers.accel_mps2 is None else f' accel="{drivers.accel_mps2!r}"'
     return (
         f'{noise}tau="{tau_s!r}" '
-        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{drivers.lc_cooperative!r}"{accel}'
+        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{drivers.lc_cooperative!r}"'
     )
 
 

@@ -1,0 +1,234 @@
+"""How a vehicle follows a slower one: it drives on, brakes in time, and then drives as that does.
+
+All functions write a trajectory into ``out`` and return its length, or 0 where there is none.
+"""
+
+import math
+
+from coramp._kernel import FloatArray, kernel
+from coramp.kinematics.trajectory import (
+    ACCEL,
+    SPEED,
+    TIME,
+    clip_end,
+    clip_start,
+    drive,
+    drive_to_speed,
+    piece_at,
+    piece_end_s,
+    station_and_speed,
+    time_at_station,
+)
+from coramp.road.rules import Rules
+from coramp.vehicles.fleet import ROUNDING_M, pair_margin_m
+from coramp.vehicles.traits import SPEED_BAND_MPS, able_mps2, cruise_mps
+
+SAME_SPEED_MPS = 1e-9
+LONGEST_LOOK_S = 60.0
+DIPS = 32
+"""In how many steps the depth of a dip in speed is chosen."""
+LEAST_SPEED_MPS = 0.5
+"""A vehicle that makes room on the road does not brake below this."""
+
+
+@kernel
+def speed_up(
+    out: FloatArray, n: int, target_mps: float, most_mps2: float, traits: FloatArray
+) -> int:
+    """Appends the stretch that brings a vehicle up to ``target_mps`` with what it can do.
+
+    A vehicle of limited power P per mass takes bands of speed, each with min(a_0, P / v) at its
+    upper end, so that it never accelerates harder than it can.
+    """
+    start_mps = out[n - 1, SPEED]
+    if target_mps <= start_mps + SAME_SPEED_MPS:
+        return n
+    bands = 1
+    if able_mps2(traits, target_mps) < min(most_mps2, able_mps2(traits, start_mps)):
+        bands = int(math.ceil((target_mps - start_mps) / SPEED_BAND_MPS))
+    for band in range(bands):
+        if n >= len(out) - 1:
+            return 0
+        ends_mps = start_mps + (target_mps - start_mps) * (band + 1) / bands
+        if band == bands - 1:
+            ends_mps = target_mps
+        n = drive_to_speed(out, n, min(most_mps2, able_mps2(traits, ends_mps)), ends_mps)
+    return n
+
+
+@kernel
+def follow(
+    base: FloatArray,
+    brake_from_s: float,
+    dip_mps: float,
+    leader: FloatArray,
+    leader_from_s: float,
+    traits: FloatArray,
+    common_rules: Rules,
+    out: FloatArray,
+) -> int:
+    """Writes: drive ``base`` until ``brake_from_s``, brake to the leader's speed, drive as it does.
+
+    The leader counts from ``leader_from_s`` on, when it comes onto the lane; before that its speed
+    at that time is aimed at. ``dip_mps`` is by how much the vehicle brakes below that speed first,
+    which opens the gap: it goes back up at once. It never drives faster than its own cruise.
+    """
+    slow_down_mps2 = common_rules.motion.slow_down_mps2
+    n = clip_start(base, base[0, TIME], out)
+    n = clip_end(out, n, max(base[0, TIME], brake_from_s))
+    n = _brake_to_leader(out, n, dip_mps, leader, leader_from_s, slow_down_mps2)
+    if n == 0:
+        return 0
+    if dip_mps > 0.0:
+        aim_mps = _leader_speed_mps(leader, out[n - 1, TIME], leader_from_s)
+        aim_mps = min(aim_mps, cruise_mps(traits, common_rules))
+        n = speed_up(out, n, aim_mps, common_rules.motion.speed_up_mps2, traits)
+        if n == 0:
+            return 0
+    return _drive_as(out, n, leader, leader_from_s, traits, common_rules)
+
+
+@kernel
+def follow_safely(
+    base: FloatArray,
+    merge_s: float,
+    brake_from_s: float,
+    leader: FloatArray,
+    leader_merge_s: float,
+    leader_traits: FloatArray,
+    traits: FloatArray,
+    most_dip_mps: float,
+    rules: Rules,
+    out: FloatArray,
+) -> int:
+    """Writes what disturbs a vehicle least that is on its way by ``base`` and keeps its distance.
+
+    That is ``base`` itself, or it braked for the leader as late as is safe, from ``brake_from_s``
+    at the earliest, or as early as that and with the least dip of up to ``most_dip_mps``. Merge
+    times are minus infinity on the mainline. Returns 0 where nothing of that is safe.
+    """
+    first_s, step_s = base[0, TIME], rules.control.step_s
+    least_m = rules.safety.execution_allowance_m - ROUNDING_M
+    pair = (leader, leader_traits, leader_merge_s, first_s, rules)
+    if pair_margin_m(base, traits, merge_s, *pair) >= least_m:
+        out[: len(base)] = base
+        return len(base)
+    brake_from_s = max(first_s, brake_from_s)
+    leaves_s = min(
+        time_at_station(leader, rules.road.mainline_end_m),
+        time_at_station(base, rules.road.mainline_end_m),
+    )
+    if math.isinf(leaves_s) or leaves_s <= brake_from_s:
+        leaves_s = brake_from_s + LONGEST_LOOK_S
+    enough, too_late = -1, int(math.ceil((leaves_s - brake_from_s) / step_s)) + 1
+    steps = 0
+    while True:
+        from_s = brake_from_s + steps * step_s
+        n = follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
+        if n > 0 and pair_margin_m(out[:n], traits, merge_s, *pair) >= least_m:
+            enough = steps
+        elif steps == 0:
+            break
+        else:
+            too_late = steps
+        if too_late - enough <= 1:
+            from_s = brake_from_s + enough * step_s
+            return follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
+        steps = (enough + too_late) // 2
+    small, large = 0, DIPS
+    level = DIPS
+    while most_dip_mps > 0.0:
+        dip_mps = most_dip_mps * level / DIPS
+        n = follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
+        if n > 0 and pair_margin_m(out[:n], traits, merge_s, *pair) >= least_m:
+            large = level
+        elif level == DIPS:
+            return 0
+        else:
+            small = level
+        if large - small <= 1:
+            dip_mps = most_dip_mps * large / DIPS
+            return follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
+        level = (small + large) // 2
+    return 0
+
+
+@kernel
+def _leader_speed_mps(leader: FloatArray, time_s: float, leader_from_s: float) -> float:
+    _, speed_mps = station_and_speed(leader, max(time_s, leader_from_s))
+    return float(speed_mps)
+
+
+@kernel
+def _brake_to_leader(
+    out: FloatArray,
+    n: int,
+    dip_mps: float,
+    leader: FloatArray,
+    leader_from_s: float,
+    slow_down_mps2: float,
+) -> int:
+    """Appends braking at d until the speed is the leader's less the dip: v - d x = v_L - dip.
+
+    While the leader changes its speed by a, that is after ``(v - v_L + dip) / (d + a)``.
+    """
+    for _ in range(len(leader) + 1):
+        if n >= len(out) - 1:
+            return 0
+        now_s, speed_mps = out[n - 1, TIME], out[n - 1, SPEED]
+        aim_mps = max(LEAST_SPEED_MPS, _leader_speed_mps(leader, now_s, leader_from_s) - dip_mps)
+        if speed_mps <= aim_mps + SAME_SPEED_MPS:
+            return n
+        k = piece_at(leader, max(now_s, leader_from_s))
+        accel_mps2, until_s = leader[k, ACCEL], piece_end_s(leader, k)
+        if now_s < leader_from_s:
+            accel_mps2, until_s = 0.0, leader_from_s
+        closing_mps2 = slow_down_mps2 + accel_mps2
+        needed_s = math.inf
+        if closing_mps2 > 1e-9:
+            needed_s = (speed_mps - aim_mps) / closing_mps2
+        most_s = min(until_s - now_s, (speed_mps - LEAST_SPEED_MPS) / slow_down_mps2)
+        n = drive(out, n, -slow_down_mps2, min(needed_s, most_s))
+        if needed_s <= until_s - now_s:
+            return n
+    return n
+
+
+@kernel
+def _drive_as(
+    out: FloatArray,
+    n: int,
+    leader: FloatArray,
+    leader_from_s: float,
+    traits: FloatArray,
+    common_rules: Rules,
+) -> int:
+    """Appends what the leader drives from here on, as far as the vehicle can, up to its cruise."""
+    cruise, now_s = cruise_mps(traits, common_rules), out[n - 1, TIME]
+    comfort_mps2 = common_rules.motion.comfort_mps2
+    if now_s < leader_from_s:
+        n = drive(out, n, 0.0, leader_from_s - now_s)
+        now_s = leader_from_s
+    k = piece_at(leader, now_s)
+    while k + 1 < len(leader):
+        if n >= len(out) - 8:
+            return 0
+        lasts_s = piece_end_s(leader, k) - now_s
+        accel_mps2 = leader[k, ACCEL]
+        speed_mps = out[n - 1, SPEED]
+        if accel_mps2 > 0.0:
+            ends_mps = min(cruise, leader[k + 1, SPEED])
+            if ends_mps > speed_mps:
+                accel_mps2 = min(accel_mps2, comfort_mps2, able_mps2(traits, ends_mps))
+                n = drive(out, n, accel_mps2, min(lasts_s, (ends_mps - speed_mps) / accel_mps2))
+        elif accel_mps2 < 0.0:
+            needed_s = (speed_mps - max(LEAST_SPEED_MPS, leader[k + 1, SPEED])) / -accel_mps2
+            if needed_s > 0.0:  # from when the leader is as slow
+                n = drive(out, n, 0.0, max(0.0, lasts_s - needed_s))
+                n = drive(out, n, accel_mps2, min(lasts_s, needed_s))
+        left_s = piece_end_s(leader, k) - out[n - 1, TIME]
+        n = drive(out, n, 0.0, left_s)
+        k += 1
+        now_s = leader[k, TIME]
+    ends_mps = min(cruise, leader[len(leader) - 1, SPEED])
+    return speed_up(out, n, ends_mps, common_rules.motion.speed_up_mps2, traits)
