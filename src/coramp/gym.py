@@ -133,6 +133,11 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._scenario = load_scenario(
             scenario, {**{k: float(v) for k, v in flows.items()}, "simulation.horizon_s": horizon_s}
         )
+        if self._scenario.vehicles_differ:
+            raise CorampError(
+                f"vehicle: the environment is for vehicles that are alike; those of {scenario} are "
+                "not; allowed are types without limits of their own"
+            )
         self._rules, self._horizon_s = self._scenario.rules(), horizon_s
         self._step_s = self._rules.control.step_s
         self._period = steps_of_period(period_s, self._step_s)

@@ -148,8 +148,8 @@ def _keeps_limits(
 ) -> tuple[int, float, float]:
     """Speeds are extreme at knots. One that begins too fast, as some enter, may slow down.
 
-    ``able`` is what the vehicle can do. With a power P per mass it speeds up by P / v at most, which
-    is least at the end of a piece.
+    ``able`` is what the vehicle can do. With a power P per mass it speeds up by P / v at most,
+    which is least at the end of a piece.
     """
     for i in range(len(pieces)):
         t, s, v, a = pieces[i]

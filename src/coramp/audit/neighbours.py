@@ -50,8 +50,8 @@ class Pairs(NamedTuple):
 def extremes_in_lane(motion: Motion, traits: FloatArray, stays: Stays, bounds: Bounds) -> Pairs:
     """Returns what is extreme among neighbours in a lane, overlaps included.
 
-    ``traits`` has one row per vehicle (``checker.distances``). Severity is that of Eq. 5, 7 and 9 as
-    printed, at lane changes, with the speed along the lane, for the lighter of the two vehicles.
+    ``traits`` has one row per vehicle (``checker.distances``). Severity is that of Eq. 5, 7 and 9
+    as printed, at lane changes, with the speed along the lane, for the lighter of two vehicles.
     """
     used = np.flatnonzero(stays.from_s < stays.until_s)
     stays = Stays._make(column[used] for column in stays)

@@ -47,8 +47,10 @@ class Bounds(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What the distance of two vehicles depends on besides their speeds: the front one's length
-    (m), the sum of their positioning errors (m), their clock errors and the follower's gap (s).
+    """What the distance of two vehicles depends on besides their speeds.
+
+    That is the front one's length and the sum of their positioning errors (m), their clock errors
+    and the follower's time gap (s).
     """
 
     front_length_m: float

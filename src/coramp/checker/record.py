@@ -28,7 +28,8 @@ class Record(NamedTuple):
     Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. What it can
     do is ``traits[i]`` (columns of ``distances``). It comes onto the mainline at ``times_s[i, 0]``
     (minus infinity for a mainline vehicle, infinity while no merge is commanded) and leaves the
-    zone at ``times_s[i, 1]`` (infinity while it would stop before). ``live`` lists the rows on the road, by entry.
+    zone at ``times_s[i, 1]`` (infinity while it would stop before). ``live`` lists the rows on the
+    road, by entry.
     """
 
     pieces: FloatArray

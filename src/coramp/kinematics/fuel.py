@@ -15,7 +15,7 @@ ROLLING, GRAVITY_MPS2 = 0.006, 9.8
 AIR_KG_PER_M = 0.5 * 1.2 * 5.2
 """Half of air density (kg/m3) times drag area c_w A (m2) of an articulated truck."""
 IDLE_MLPS, WHEEL_J_PER_ML = 0.8, 0.40 * 35500.0
-"""Fuel of the idling engine, and work at the wheels per ml: efficiency times 35.5 kJ/ml (diesel)."""
+"""Fuel of the idling engine; work at the wheels per ml: efficiency times 35.5 kJ/ml (diesel)."""
 P0, P1, P2, P3 = 0.1569, 0.0245, -7.415e-4, 5.975e-5
 Q0, Q1, Q2 = 0.07224, 0.09681, 1.075e-3
 LITRES_PER_MILLILITRE = 1e-3

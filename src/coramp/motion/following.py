@@ -45,7 +45,7 @@ def speed_up(
         return n
     bands = 1
     if able_mps2(traits, target_mps) < min(most_mps2, able_mps2(traits, start_mps)):
-        bands = int(math.ceil((target_mps - start_mps) / SPEED_BAND_MPS))
+        bands = math.ceil((target_mps - start_mps) / SPEED_BAND_MPS)
     for band in range(bands):
         if n >= len(out) - 1:
             return 0
@@ -107,50 +107,71 @@ def follow_safely(
     at the earliest, or as early as that and with the least dip of up to ``most_dip_mps``. Merge
     times are minus infinity on the mainline. Returns 0 where nothing of that is safe.
     """
-    first_s, step_s = base[0, TIME], rules.control.step_s
-    least_m = rules.safety.execution_allowance_m - ROUNDING_M
-    pair = (leader, leader_traits, leader_merge_s, first_s, rules)
-    if pair_margin_m(base, traits, merge_s, *pair) >= least_m:
+    pair = (leader, leader_traits, leader_merge_s, base[0, TIME], rules)
+    if _is_safe(base, traits, merge_s, *pair):
         out[: len(base)] = base
         return len(base)
-    brake_from_s = max(first_s, brake_from_s)
-    leaves_s = min(
-        time_at_station(leader, rules.road.mainline_end_m),
-        time_at_station(base, rules.road.mainline_end_m),
-    )
-    if math.isinf(leaves_s) or leaves_s <= brake_from_s:
-        leaves_s = brake_from_s + LONGEST_LOOK_S
-    enough, too_late = -1, int(math.ceil((leaves_s - brake_from_s) / step_s)) + 1
+    brake_from_s = max(base[0, TIME], brake_from_s)
+    step_s, large = rules.control.step_s, DIPS
+    enough, too_late = -1, _steps_to_brake(base, brake_from_s, leader, rules) + 1
     steps = 0
-    while True:
+    while too_late - enough > 1:  # the latest step at which braking is safe
         from_s = brake_from_s + steps * step_s
         n = follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
-        if n > 0 and pair_margin_m(out[:n], traits, merge_s, *pair) >= least_m:
+        if _is_safe(out[:n], traits, merge_s, *pair):
             enough = steps
         elif steps == 0:
             break
         else:
             too_late = steps
-        if too_late - enough <= 1:
-            from_s = brake_from_s + enough * step_s
-            return follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
         steps = (enough + too_late) // 2
-    small, large = 0, DIPS
-    level = DIPS
-    while most_dip_mps > 0.0:
+    if enough >= 0:
+        from_s = brake_from_s + enough * step_s
+        return follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
+    small, level = 0, DIPS
+    if most_dip_mps <= 0.0:
+        return 0
+    while large - small > 1:  # the least dip
         dip_mps = most_dip_mps * level / DIPS
         n = follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
-        if n > 0 and pair_margin_m(out[:n], traits, merge_s, *pair) >= least_m:
+        if _is_safe(out[:n], traits, merge_s, *pair):
             large = level
         elif level == DIPS:
             return 0
         else:
             small = level
-        if large - small <= 1:
-            dip_mps = most_dip_mps * large / DIPS
-            return follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
         level = (small + large) // 2
-    return 0
+    dip_mps = most_dip_mps * large / DIPS
+    return follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
+
+
+@kernel
+def _is_safe(
+    pieces: FloatArray,
+    traits: FloatArray,
+    merge_s: float,
+    leader: FloatArray,
+    leader_traits: FloatArray,
+    leader_merge_s: float,
+    from_s: float,
+    rules: Rules,
+) -> bool:
+    """Whether a vehicle that drives these pieces keeps its distance; never one that has none."""
+    if len(pieces) == 0:
+        return False
+    pair = (leader, leader_traits, leader_merge_s, from_s, rules)
+    margin_m = pair_margin_m(pieces, traits, merge_s, *pair)
+    return bool(margin_m >= rules.safety.execution_allowance_m - ROUNDING_M)
+
+
+@kernel
+def _steps_to_brake(base: FloatArray, from_s: float, leader: FloatArray, rules: Rules) -> int:
+    """Returns how many steps later than ``from_s`` it makes sense to brake: until one leaves."""
+    end_m = rules.road.mainline_end_m
+    leaves_s = min(time_at_station(leader, end_m), time_at_station(base, end_m))
+    if math.isinf(leaves_s) or leaves_s <= from_s:
+        leaves_s = from_s + LONGEST_LOOK_S
+    return math.ceil((leaves_s - from_s) / rules.control.step_s)
 
 
 @kernel

@@ -98,7 +98,7 @@ class Traffic(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Everything a planner is bound by. Vehicles may be bound by less of their own (``vehicles``)."""
+    """Everything a planner is bound by; a vehicle may have lower limits (``vehicles.traits``)."""
 
     road: Road
     safety: SafetyBudget

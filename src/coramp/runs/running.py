@@ -21,8 +21,9 @@ from coramp.runs.unserved import unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.toml_files import key_parts
-from coramp.strategies.base import is_metered, vehicles_may_differ
-from coramp.strategies.registry import strategies, strategy_named
+from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
+from coramp.strategies.base import is_metered
+from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import (
     LARGEST_PLAN_ERROR_M,
@@ -133,8 +134,7 @@ def make_spec(
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
-    if loaded.vehicles_differ and chosen.cooperative and not vehicles_may_differ(chosen):
-        raise CorampError(differing_vehicles_refused(strategy))
+    check_vehicles_may_differ(loaded, strategy)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)
     if is_metered(chosen) and loaded.signal_problem:
@@ -145,19 +145,6 @@ def make_spec(
     if chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
-
-
-def differing_vehicles_refused(strategy: str) -> str:
-    """Returns the line that refuses a strategy that plans for equal vehicles alone."""
-    able = ", ".join(
-        name
-        for name, kind in strategies().items()
-        if vehicles_may_differ(kind) or not kind.cooperative
-    )
-    return (
-        f"strategy: {strategy} plans for vehicles that are alike but for their length and mass; "
-        f"with these types of vehicles allowed are {able}"
-    )
 
 
 def engine_checked(engine: str) -> str:
@@ -227,8 +214,12 @@ def recorded(
 ) -> RunRecords:
     """Returns the records of a run, made now; raises CorampError where it fails.
 
-    ``notice`` is told where vehicles were left unserved.
+    ``notice`` is told of types that merge slower than they cruise, and of vehicles left unserved.
     """
+    if strategy_named(spec.strategy).cooperative:
+        warning = slow_merge_warning(spec.scenario)
+        if warning is not None:
+            notice(warning)
     tables, row = execute(spec, options)
     if (line := unserved_line(tables.outcome)) is not None:
         notice(line)

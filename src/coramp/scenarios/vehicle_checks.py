@@ -2,7 +2,10 @@
 
 from typing import TYPE_CHECKING
 
+from coramp.errors import CorampError
 from coramp.scenarios.vehicle_types import VehicleType, share_problems
+from coramp.strategies.base import vehicles_may_differ
+from coramp.strategies.registry import strategies, strategy_named
 
 if TYPE_CHECKING:
     from coramp.scenarios.model import Scenario
@@ -54,6 +57,22 @@ def _type_problems(scenario: "Scenario", kind: VehicleType) -> list[str]:
                 f"ramp.decision_station_m; allowed is at least {need_mps2:.2f} m/s2"
             )
     return problems
+
+
+def check_vehicles_may_differ(scenario: "Scenario", strategy: str) -> None:
+    """Raises CorampError for a strategy that plans for equal vehicles where they differ."""
+    chosen = strategy_named(strategy)
+    if not scenario.vehicles_differ or not chosen.cooperative or vehicles_may_differ(chosen):
+        return
+    able = ", ".join(
+        name
+        for name, kind in strategies().items()
+        if vehicles_may_differ(kind) or not kind.cooperative
+    )
+    raise CorampError(
+        f"strategy: {strategy} plans for vehicles that are alike but for their length and mass; "
+        f"with these types of vehicles allowed are {able}"
+    )
 
 
 def slow_merge_warning(scenario: "Scenario") -> str | None:

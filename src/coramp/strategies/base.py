@@ -247,7 +247,8 @@ class Strategy(Decider, Protocol):
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
     by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
     for one that needs a signal and detectors on the ramp, in SUMO. ``vehicles_may_differ`` is True
-    for one that plans with vehicles' own limits; others are refused where vehicles differ. ``entry_policy`` is what it
+    for one that plans with vehicles' own limits; others are refused where vehicles differ.
+    ``entry_policy`` is what it
     asks of entries, if anything: see ``entry_policy_of``. One whose parameters must fit
     together has a method ``problems()``, which returns lines ``parameter: what is wrong; what is
     allowed``.

@@ -202,7 +202,7 @@ def come_later_by(
     make_room: bool,
     rules: Rules,
 ) -> UnequalMerge:
-    """Proposes to pass the nose later: by slowing down at once, or at a slower speed, or a stand."""
+    """Proposes to pass the nose later: slower at once, slower all the way, or after a stand."""
     own = own_rules(fleet.traits[subject.row], rules, True)
     before, from_s = committed(fleet, subject.row), subject.from_s
     station_m, speed_mps = station_and_speed(before, from_s)
@@ -314,7 +314,7 @@ def unequal_plan(
         merge.accel_mps2,
         merge.time_s,
         merge.station_m,
-        _largest_shift_m(fleet, proposal, merge, rules),
+        _largest_shift_m(fleet, proposal, merge),
         before[0],
         after[0],
         before[1],
@@ -348,7 +348,7 @@ def _severity(
 
 
 @kernel
-def _largest_shift_m(fleet: Fleet, proposal: Proposal, merge: UnequalMerge, rules: Rules) -> float:
+def _largest_shift_m(fleet: Fleet, proposal: Proposal, merge: UnequalMerge) -> float:
     """Returns by how far (m) at most a vehicle that makes room is back when the subject merges."""
     largest_m = 0.0
     for entry in range(1, proposal.size[0]):

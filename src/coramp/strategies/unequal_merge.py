@@ -37,6 +37,7 @@ from coramp.vehicles.fleet import (
 )
 from coramp.vehicles.traits import LENGTH, cruise_mps, pair_safety
 
+MOST_AIMS = 3
 SLOWER_MPS = 0.1
 """A vehicle ahead that is slower than aimed at by more than this sets the speed of the merge."""
 
@@ -125,34 +126,15 @@ def try_merge(
     adapt, each to the one ahead of it. ``known_m`` is the foremost intercept of a vehicle that has
     not entered, minus infinity where that does not matter.
     """
-    from_s, v0 = approach[0, TIME], rules.road.mainline_speed_mps
-    traits = fleet.traits[subject]
-    cruise, n = cruise_mps(traits, rules), len(approach)
+    from_s, traits = approach[0, TIME], fleet.traits[subject]
     base = np.empty((MAX_PIECES, 4))
-    base[:n] = approach
-    aim_mps, merge_s, m, place = cruise, math.nan, 0, 0
-    order = rows_on_mainline(fleet, subject, from_s)
-    for _ in range(3):
-        m, merge_s = _speed_up_and_merge(base, n, aim_mps, accel_mps2, traits, rules)
-        if m == 0:
-            return no_unequal_merge()
-        order = rows_on_mainline(fleet, subject, merge_s)
-        merge_m, merge_mps = station_and_speed(base[:m], merge_s)
-        place = place_in_order(fleet, order, merge_m, merge_s)
-        if place == 0:
-            break
-        _, front_mps = station_and_speed(committed(fleet, order[place - 1]), merge_s)
-        if front_mps >= merge_mps - SLOWER_MPS:
-            break
-        aim_mps = max(front_mps, approach[n - 1, SPEED])
-    merge_m, merge_mps = station_and_speed(base[:m], merge_s)
-    clear_m = traits[LENGTH] + merge_clearance_m(
-        rules.road, pair_safety(traits, traits, rules.safety)
-    )
-    if merge_m <= 0.0 or merge_m - clear_m - v0 * merge_s < known_m:
-        return no_unequal_merge()
-    m = speed_up(base, m, cruise, rules.motion.speed_up_mps2, traits)
+    m, merge_s, order, place = way_to_merge(fleet, subject, approach, accel_mps2, rules, base)
     if m == 0:
+        return no_unequal_merge()
+    merge_m, merge_mps = station_and_speed(base[:m], merge_s)
+    room_m = merge_clearance_m(rules.road, pair_safety(traits, traits, rules.safety))
+    rear_m = merge_m - traits[LENGTH] - room_m
+    if merge_m <= 0.0 or rear_m - rules.road.mainline_speed_mps * merge_s < known_m:
         return no_unequal_merge()
     count = m
     proposal.pieces[0, :m] = base[:m]
@@ -186,6 +168,43 @@ def try_merge(
 
 
 @kernel
+def way_to_merge(
+    fleet: Fleet,
+    subject: int,
+    approach: FloatArray,
+    accel_mps2: float,
+    rules: Rules,
+    out: FloatArray,
+) -> tuple[int, float, IntArray, int]:
+    """Writes the subject's way by ``approach`` onto the mainline and up to its own cruise.
+
+    It aims at that speed, or at that of a slower vehicle that will be ahead of it. Returns the
+    length, 0 for none, the merge time (s), the rows on the mainline as they are then, and how many
+    of them are ahead.
+    """
+    traits, n = fleet.traits[subject], len(approach)
+    cruise = aim_mps = cruise_mps(traits, rules)
+    out[:n] = approach
+    m, merge_s, place = 0, math.nan, 0
+    order = rows_on_mainline(fleet, subject, approach[0, TIME])
+    for _ in range(MOST_AIMS):
+        m, merge_s = _speed_up_and_merge(out, n, aim_mps, accel_mps2, traits, rules)
+        if m == 0:
+            return 0, merge_s, order, place
+        order = rows_on_mainline(fleet, subject, merge_s)
+        merge_m, merge_mps = station_and_speed(out[:m], merge_s)
+        place = place_in_order(fleet, order, merge_m, merge_s)
+        if place == 0:
+            break
+        _, front_mps = station_and_speed(committed(fleet, order[place - 1]), merge_s)
+        if front_mps >= merge_mps - SLOWER_MPS:
+            break
+        aim_mps = max(front_mps, approach[n - 1, SPEED])
+    m = speed_up(out, m, cruise, rules.motion.speed_up_mps2, traits)
+    return m, merge_s, order, place
+
+
+@kernel
 def give_way(
     fleet: Fleet,
     proposal: Proposal,
@@ -195,7 +214,7 @@ def give_way(
     make_room: bool,
     rules: Rules,
 ) -> float:
-    """Adds the vehicles behind the subject that must adapt, one after the other; what they lose (s).
+    """Adds the vehicles behind the subject that must adapt, front first; returns their loss (s).
 
     ``place`` is that of the first one behind it in ``order``. Returns infinity where one of them
     would have to adapt and cannot, or may not.

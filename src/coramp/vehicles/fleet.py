@@ -18,7 +18,8 @@ class Fleet(NamedTuple):
 
     Row i's trajectory is ``pieces[first_piece[i] : first_piece[i] + piece_count[i]]``.
     ``merge_time_s`` is minus infinity for mainline vehicles, infinity for a ramp vehicle whose
-    merge is not committed. ``traits`` are rows of ``vehicles.traits``. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
+    merge is not committed. ``traits`` are rows of
+    ``vehicles.traits``. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
     trajectory.
     """
 

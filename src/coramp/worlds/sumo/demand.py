@@ -17,7 +17,7 @@ ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
 
 
 def cooperative_type(arrival: Arrival) -> str:
-    """Returns the name of a cooperative vehicle's type in SUMO: by length, and type if not a car."""
+    """Returns the name of a cooperative vehicle's type in SUMO: by length, and kind if no car."""
     kind = "" if arrival.vehicle_type == CAR else f"{arrival.vehicle_type}-"
     return f"cooperative-{kind}{arrival.length_m!r}"
 
@@ -116,8 +116,9 @@ def _ability(drivers: Drivers, arrival: Arrival) -> str:
             (speed, min(traits.acceleration_mps2, traits.power_wpkg / max(speed, 0.1)))
             for speed in PROFILE_MPS
         ]
-        profile = ",".join(f"{speed:g} {min(accel, 10.0):.3f}" for speed, accel in points)
-        told += f' maxAccelProfile="{profile}" desAccelProfile="{profile}"'
+        speeds = " ".join(f"{speed:g}" for speed, _ in points)
+        profile = " ".join(f"{min(accel, 10.0):.3f}" for _, accel in points)
+        told += f' speedTable="{speeds}" maxAccelProfile="{profile}" desAccelProfile="{profile}"'
     return told
 
 
