@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.explain.decision import Quantity, quantities
+from coramp.explain.decision import quantities
+from coramp.explain.quantity import Quantity
 from coramp.records.files import made_folder
 from coramp.records.run_folder import SUMO, not_replaceable, write_run
 from coramp.records.staging import staged_folder

@@ -16,7 +16,7 @@ from rich.table import Table as RichTable
 from coramp.api import PlanResult, RunResult, StudyResult
 from coramp.audit.verdicts import Audit
 from coramp.cli.run_table import run_table
-from coramp.explain.decision import Quantity
+from coramp.explain.quantity import Quantity
 from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
 from coramp.runs.running import finite_or_none
@@ -166,7 +166,7 @@ def print_story(story: Story) -> None:
             f", after waiting {number(vehicle['waiting_s'], 1)} s" if vehicle["waiting_s"] else ""
         )
         print(f"  {number(vehicle['entry_s'], 1)} s: enters{waited}")
-    events = [(c.decision["time_s"], told(c.decision)) for c in story.chapters]
+    events = [(c.decision["time_s"], c.text) for c in story.chapters]
     events += [(row["time_s"], _moved(row)) for row in story.moved_for]
     for time_s, text in sorted(events):
         print(f"  {number(time_s, 1)} s: {text}")
@@ -200,7 +200,7 @@ def story_json(story: Story) -> Row:
         "decisions": [
             {
                 **chapter.decision,
-                "told": told(chapter.decision),
+                "told": chapter.text,
                 "quantities": [_quantity_json(q) for q in chapter.quantities],
             }
             for chapter in story.chapters

@@ -55,26 +55,9 @@ from coramp.equations.safe_distance import (
     safe_distance_m,
     speed_difference_distance_m,
 )
+from coramp.explain.quantity import Quantity
 from coramp.road.rules import Rules
 from coramp.scenarios.model import Scenario
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One line: its equation, symbol, what it is, value and unit."""
-
-    equation: str
-    symbol: str
-    meaning: str
-    value: float | bool
-    unit: str = ""
-
-    def text(self) -> str:
-        """Returns the value with its unit."""
-        if isinstance(self.value, bool):
-            return "yes" if self.value else "no"
-        return f"{self.value:.4f} {self.unit}".strip()
-
 
 EVEN_M = 1e-3
 """A merge station this near to that of Eq. 28 is that of Eq. 28."""

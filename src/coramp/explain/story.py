@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.explain.decision import EVEN_M, Quantity, quantities
+from coramp.explain.decision import EVEN_M, quantities
+from coramp.explain.own_limits import own_quantities
+from coramp.explain.quantity import Quantity
 from coramp.records.run import RunRecords, moved_for
 from coramp.records.run_folder import read_run
 from coramp.records.schemas import Row
@@ -13,9 +15,10 @@ from coramp.records.schemas import Row
 
 @dataclass(frozen=True)
 class Chapter:
-    """One decision about the vehicle, with the quantities behind it."""
+    """One decision about the vehicle, in a sentence, with the quantities behind it."""
 
     decision: Row
+    text: str
     quantities: list[Quantity]
 
 
@@ -49,10 +52,20 @@ def story_in(run: RunRecords, vehicle_id: str, folder: Path | None = None) -> St
     about = decisions.filter(vehicle_id=vehicle_id)
     return Story(
         vehicle,
-        [Chapter(row, quantities(row, run.scenario)) for row in about.iter_rows(named=True)],
+        [
+            Chapter(row, told(row, run.scenario.vehicles_differ), quantities_in(run, row))
+            for row in about.iter_rows(named=True)
+        ],
         moved_for(decisions, vehicle_id),
         {key: run.content[key] for key in ("scenario", "strategy", "seed", "run_id")},
     )
+
+
+def quantities_in(run: RunRecords, decision: Row) -> list[Quantity]:
+    """Returns the quantities behind a decision of a run: the paper's, or each vehicle's own."""
+    if run.scenario.vehicles_differ:
+        return own_quantities(decision, run)
+    return quantities(decision, run.scenario)
 
 
 def accelerates_evenly(decision: Row) -> bool:
@@ -62,8 +75,11 @@ def accelerates_evenly(decision: Row) -> bool:
     return bool(abs(even_m - decision["merge_station_m"]) < EVEN_M)
 
 
-def told(decision: dict[str, Any]) -> str:
-    """Returns in one sentence what a decision was."""
+def told(decision: dict[str, Any], vehicles_differ: bool = False) -> str:
+    """Returns in one sentence what a decision was.
+
+    Where vehicles differ, a merge need not have one acceleration from the nose on.
+    """
     front, rear = decision["front_vehicle_id"], decision["rear_vehicle_id"]
     match front, rear:
         case None, None:
@@ -76,7 +92,7 @@ def told(decision: dict[str, Any]) -> str:
             where = f"between {front} and {rear}"
     moved = ", ".join(decision["adjusted_vehicle_ids"] or [])
     match decision["rung"]:
-        case "free" | "reach" if not accelerates_evenly(decision):
+        case "free" | "reach" if not (vehicles_differ or accelerates_evenly(decision)):
             how = "a way of least effort leads into a gap: it merges"
         case "free":
             how = "free movement is safe as it is: it merges"

@@ -17,7 +17,6 @@ from coramp.records.outcome import LANES
 from coramp.records.schemas import TRAJECTORIES
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.snapshots import Snapshot, SnapshotVehicle
-from coramp.scenarios.vehicle_checks import check_vehicles_may_differ
 from coramp.strategies.base import period_of
 from coramp.strategies.registry import strategy_named
 
@@ -46,7 +45,11 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
             f"strategy: {strategy} steers step by step and plans nothing ahead; "
             "choose one that plans"
         )
-    check_vehicles_may_differ(scenario, strategy)
+    if scenario.vehicles_differ:
+        raise CorampError(
+            "vehicle: a situation is planned for vehicles that are alike but for their length; "
+            "allowed are types without limits of their own"
+        )
     if not strategy_named(strategy).cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))

@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import polars as pl
 
-from coramp.demand.arrivals import arrivals_of
-from coramp.explain.decision import quantities
-from coramp.explain.story import told
+from coramp.explain.story import quantities_in, told
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.style import look_of
 from coramp.scenarios.model import Scenario
+from coramp.vehicles.traits import CAR
 from coramp.worlds.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
 
 PIECE_COLUMNS = ("time_s", "station_m", "speed_mps", "accel_mps2")
@@ -50,7 +49,8 @@ def page_data(run: RunRecords) -> Row:
         "safety": run.scenario.safety.model_dump(mode="json"),
         "ids": ids,
         "on_ramp": [int(stream == "ramp") for stream in run.vehicles["stream"].to_list()],
-        "length": _lengths_m(run, ids),
+        "length": _lengths_m(run),
+        "type": _types(run),
         "scheduled": _rounded(run.vehicles["scheduled_s"].to_list()),
         "exit": _rounded(exits_s),
         "merge": _rounded(merge_s),
@@ -112,10 +112,16 @@ def _pieces(
     return first.tolist(), np.column_stack(columns).ravel().tolist(), merge_s
 
 
-def _lengths_m(run: RunRecords, ids: list[str]) -> list[float]:
-    arrivals = arrivals_of(run.scenario, run.summary["seed"])
-    known = {arrival.vehicle_id: arrival.length_m for arrival in arrivals}
-    return [known.get(name, run.scenario.usual_length_m) for name in ids]
+def _lengths_m(run: RunRecords) -> list[float]:
+    if "length_m" in run.vehicles.columns:
+        return run.vehicles["length_m"].to_list()
+    return [run.scenario.usual_length_m] * run.vehicles.height
+
+
+def _types(run: RunRecords) -> list[str]:
+    if "vehicle_type" in run.vehicles.columns:
+        return run.vehicles["vehicle_type"].to_list()
+    return [CAR] * run.vehicles.height
 
 
 def _decision(
@@ -125,14 +131,14 @@ def _decision(
     templates: dict[tuple[str, str, str], int],
 ) -> Row:
     found = []
-    for quantity in quantities(row, run.scenario):
+    for quantity in quantities_in(run, row):
         key = (quantity.equation, quantity.symbol, quantity.meaning)
         found.append([templates.setdefault(key, len(templates)), quantity.text()])
     return {
         "time": round(row["time_s"], 3),
         "vehicle": place_of[row["vehicle_id"]],
         "rung": row["rung"],
-        "told": told(row),
+        "told": told(row, run.scenario.vehicles_differ),
         "adjusted": [place_of[name] for name in row["adjusted_vehicle_ids"] or []],
         "merge_time": _finite(row["merge_time_s"]),
         "merge_station": _finite(row["merge_station_m"]),
