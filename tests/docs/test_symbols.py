@@ -26,6 +26,8 @@ UNITS = {
     "mps2": "m/s2",
     "mps": "m/s",
     "deg": "deg",
+    "wpkg": "W/kg",
+    "kg": "kg",
     "m": "m",
     "s": "s",
     "l": "l",
@@ -34,6 +36,7 @@ SEVERITY = "m2/s4"
 EQUATIONS = 48
 FILES = {
     "vehicles.parquet": schemas.VEHICLES,
+    "types.parquet": schemas.TYPES,
     "trajectories.parquet": schemas.TRAJECTORIES,
     "decisions.parquet": schemas.DECISIONS,
     "speeds.parquet": schemas.SPEEDS,
@@ -84,15 +87,25 @@ def inner_model(annotation):
     return None
 
 
+def inner_models(annotation):
+    """Returns every model in an annotation, as ``inner_model`` does; a union may have several."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return inner_models(arguments[0])
+    if origin in (Union, UnionType):
+        return [found for argument in arguments for found in inner_models(argument)]
+    found = inner_model(annotation)
+    return [] if found is None else [found]
+
+
 def keys_of(model, prefix=""):
     """Returns every dotted key of a model with its field."""
     keys = {}
     for name, field in model.model_fields.items():
-        found = inner_model(field.annotation)
-        if found is None:
+        found = inner_models(field.annotation)
+        if not found:
             keys[prefix + name] = field
-        else:
-            inner, place = found
+        for inner, place in found:
             keys.update(keys_of(inner, f"{prefix}{name}." + (f"{place}." if place else "")))
     return keys
 
