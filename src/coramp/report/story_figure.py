@@ -1,4 +1,4 @@
-"""One vehicle's decision in a picture: the road at that moment, and what all vehicles then drove."""
+"""A picture of one vehicle's decision: the road at that moment, and all trajectories after it."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""One look for all figures: colours, markers and lines per strategy, sizes, and how files are written.
+"""One look for all figures: colours, markers and lines per strategy, sizes, and how files look.
 
 Colours are the Okabe-Ito palette, which colour-blind readers can tell apart; markers and lines
 differ as well, so that a print in grey can be read.
