@@ -1,4 +1,4 @@
-"""Strategies side by side: one diagram a metric, one row a strategy, both ranges of flows."""
+"""Strategies side by side: a diagram per metric, a row per strategy, both ranges of flows."""
 
 import math
 

@@ -149,7 +149,7 @@ def _draw_printed(axes: Axes, stream: str, strategy: str, flows: Sequence[Flows]
 
 
 def rung_figure(runs: pl.DataFrame) -> Figure:
-    """Returns the share (%) of merges that each rung gave, by flow, a diagram a strategy.
+    """Returns the share (%) of merges that each rung gave, by flow, in a diagram per strategy.
 
     Marks are the share of ramp vehicles that had to wait for a merge at least once (hold).
     """

@@ -1,4 +1,4 @@
-"""Delay against fuel: who is on the Pareto front, for both ranges of flows."""
+"""Delay against fuel: the strategies on the Pareto front, for both ranges of flows."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""One vehicle's decision in a picture: the road at that moment, and what everyone then drove."""
+"""A picture of one vehicle's decision: the road at that moment, and all trajectories after it."""
 
 import math
 from pathlib import Path
@@ -40,7 +40,7 @@ def story_figure(run: RunRecords, vehicle_id: str) -> Figure:
 
     The decision is the last that gave the vehicle a merge, else its last, else the last that moved
     it for another; without any, its own passage is drawn alone. Raises CorampError where there is
-    no such vehicle, where it never entered, and where nobody was coordinated.
+    no such vehicle, where it never entered, and where no vehicle was coordinated.
     """
     scene = scene_of(run, vehicle_id)
     if scene.decision is None:

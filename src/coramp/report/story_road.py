@@ -1,4 +1,4 @@
-"""The road from above at one decision: who is where, the gap, and the place that it leaves."""
+"""The road from above at one decision: the vehicles, the gap, and the place that it leaves."""
 
 import math
 from typing import Any

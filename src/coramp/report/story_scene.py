@@ -1,4 +1,4 @@
-"""What a picture of one vehicle's decision shows: which decision, who has to do with it, when."""
+"""What a picture of one vehicle's decision shows: which decision, which vehicles, and when."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -60,7 +60,7 @@ class Driven:
 
 @dataclass(frozen=True)
 class Scene:
-    """One decision with everyone's trajectories; ``decision`` is None where there was none.
+    """One decision with all trajectories; ``decision`` is None where there was none.
 
     ``asked`` is the vehicle that the picture is of, ``subject`` the one whose decision it is.
     ``roles`` say what each vehicle of interest is: SUBJECT, FRONT, REAR, MOVED or BRAKED,
@@ -186,7 +186,7 @@ def _roles(decision: Row) -> dict[str, tuple[str, ...]]:
 
 
 def _passage(run: RunRecords, vehicle_id: str, driven: Mapping[str, Driven]) -> Scene:
-    """The scene of a vehicle that no decision had to do with, with who leaves before and after."""
+    """The scene of a vehicle without a decision, with the vehicles that leave before and after."""
     left = run.vehicles.filter(pl.col("exit_s").is_not_null()).sort("exit_s")["vehicle_id"]
     order, roles = left.to_list(), {vehicle_id: (SUBJECT,)}
     if vehicle_id in order:

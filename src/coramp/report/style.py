@@ -1,4 +1,4 @@
-"""One look for all figures: colours, markers and lines a strategy, sizes, and how files come out.
+"""One look for all figures: colours, markers and lines per strategy, sizes, and how files look.
 
 Colours are the Okabe-Ito palette, which colour-blind readers can tell apart; markers and lines
 differ as well, so that a print in grey can be read.
@@ -79,7 +79,7 @@ METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
 
 
 def look_of(strategy: str, drivers: str | None = None) -> Look:
-    """Returns how a strategy is drawn; one that is not known is black, with its own name."""
+    """Returns how a strategy is drawn; an unknown one is black, with its own name."""
     if drivers is not None and strategy == "uncontrolled":
         known = UNCONTROLLED.get(drivers)
     else:

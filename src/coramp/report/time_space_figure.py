@@ -1,4 +1,4 @@
-"""Station over time of everyone in a run, within a window of time."""
+"""Station over time of all vehicles of a run, within a window of time."""
 
 import math
 
@@ -21,8 +21,8 @@ def run_time_space_figure(
     """Returns station (m) over time (s) of all vehicles of a cooperative run, a line each.
 
     From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges; the gid
-    of a line is its vehicle's id. Raises CorampError for a run in which nobody was coordinated and
-    for an empty window.
+    of a line is its vehicle's id. Raises CorampError for a run in which no vehicle was
+    coordinated and for an empty window.
     """
     trajectories, decisions = run.coordinated("plot")
     from_s = 0.0 if from_s is None else from_s

@@ -44,7 +44,7 @@ class Free(NamedTuple):
 
 
 def free_movement(planned: PlannedSnapshot) -> Free:
-    """Returns what the first ramp vehicle does if nobody coordinates it (Eq. 11 to 14, 18)."""
+    """Returns what the first ramp vehicle does without coordination (Eq. 11 to 14, 18)."""
     vehicle = next(v for v in planned.snapshot.vehicles if v.stream == "ramp")
     v0_mps = planned.scenario.mainline.speed_mps
     accel_mps2 = planned.scenario.motion.free_acceleration_mps2

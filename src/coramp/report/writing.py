@@ -1,4 +1,4 @@
-"""Writing reports and replays of what lies in a folder."""
+"""Writing the report or the replay of a folder."""
 
 import shlex
 from pathlib import Path
@@ -22,8 +22,8 @@ def report(
     """Writes ``report.html`` into the folder of a run or a study and returns its path.
 
     One file that works without a network. ``against`` is the folder of another run on the same
-    arrivals, to stand beside a run. Raises CorampError where
-    there is nothing to report, or that cannot be read or written.
+    arrivals, to be compared with a run. Raises CorampError where there is nothing to report, or
+    where files cannot be read or written.
     """
     place = Path(folder)
     target = place / REPORT
@@ -46,7 +46,7 @@ def report(
 def replay(folder: str | Path, against: str | Path | None = None) -> Path:
     """Writes ``replay.html`` into the folder of a run and returns its path.
 
-    ``against`` is the folder of another run on the same arrivals, to be seen beside it. Raises
+    ``against`` is the folder of another run on the same arrivals, shown beside it. Raises
     CorampError where there is no run, arrivals differ, or it cannot be written.
     """
     runs = [read_run(Path(name)) for name in (folder, against) if name is not None]

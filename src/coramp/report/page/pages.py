@@ -136,7 +136,7 @@ def _difference(runs: Sequence[RunRecords]) -> list[str]:
 
 
 def notes(run: RunRecords) -> list[str]:
-    """Returns what must be said of a run before all else."""
+    """Returns the warnings that a run's page shows first."""
     row, found = run.summary, []
     broken = broken_promises(row)
     if broken:

@@ -1,4 +1,4 @@
-"""A run as a page shows it: plain data of where everyone is, and why."""
+"""A run as a page shows it: plain data of where all vehicles are, and why."""
 
 import math
 from collections.abc import Iterable, Iterator
