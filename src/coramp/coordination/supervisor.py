@@ -24,6 +24,7 @@ from coramp.equations.safe_distance import merge_clearance_m, standing_clearance
 from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m
 from coramp.motion.approach import stop_of_m
 from coramp.motion.driving import hold_then_cruise, hold_then_merge, hold_then_stop
+from coramp.motion.lane_change import lane_change_s
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import DriveWithAcceleration
 from coramp.strategies.ramp_queue import next_ahead_on_ramp
@@ -116,7 +117,7 @@ def _drive_one(
     if merge or merge_s < math.inf:
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
-            change_s = _lane_change_s(out[:n], rules)
+            change_s = lane_change_s(out[n - 1, TIME], rules.control.step_s)
             if _commit_if_safe(book, record, row, out[:n], change_s, now_s, rules, bounds):
                 return True
     if merge_s < math.inf:
@@ -124,17 +125,6 @@ def _drive_one(
     stop_m = _place_to_stop_m(fleet, row, from_s, rules)
     n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
     return _commit_if_safe(book, record, row, out[:n], math.inf, now_s, rules, bounds)
-
-
-@kernel
-def _lane_change_s(pieces: FloatArray, rules: Rules) -> float:
-    """Returns when a vehicle that ends at v0 changes lanes: at the next step of the clock.
-
-    That is when a simulator does. Others may be speeding up or braking then, and Eq. 15, 16 ask for
-    more or less with their speeds.
-    """
-    step_s = rules.control.step_s
-    return float(math.ceil(pieces[len(pieces) - 1, TIME] / step_s - 1e-6) * step_s)
 
 
 @kernel

@@ -14,14 +14,13 @@ from coramp.equations.safe_distance import merge_clearance_m
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
-    STATION,
     TIME,
     clip_start,
-    drive,
     station_and_speed,
     time_at_station,
 )
 from coramp.motion.following import follow_safely, speed_up
+from coramp.motion.lane_change import ON_GRID, lane_change_s
 from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.proposals import find_unsafe_pair
@@ -97,16 +96,19 @@ def _speed_up_and_merge(
 ) -> tuple[int, float]:
     """Appends the way up to a speed; returns the length, 0 for none, and when it merges (s).
 
-    That is at the speed aimed at, or at the last merge station at the speed that it has there.
+    That is at the first step at which it has the speed aimed at, and is on the acceleration lane,
+    or at the last step before the last merge station, at the speed that it has there.
     """
+    step_s, last_m = rules.control.step_s, rules.road.last_merge_station_m
     m = speed_up(out, n, aim_mps, accel_mps2, traits)
     if m == 0:
         return 0, math.nan
-    if m == n:  # as fast already: it merges with the first step behind the nose
-        return drive(out, n, 0.0, rules.control.step_s), out[n - 1, TIME] + rules.control.step_s
-    if out[m - 1, STATION] <= rules.road.last_merge_station_m + ROUNDING_M:
-        return m, out[m - 1, TIME]
-    return m, time_at_station(out[:m], rules.road.last_merge_station_m)
+    merge_s = lane_change_s(max(out[m - 1, TIME], out[n - 1, TIME] + ON_GRID * step_s), step_s)
+    if station_and_speed(out[:m], merge_s)[0] <= 0.0:
+        merge_s += step_s
+    if station_and_speed(out[:m], merge_s)[0] > last_m + ROUNDING_M:
+        merge_s = lane_change_s(time_at_station(out[:m], last_m), step_s) - step_s
+    return m, merge_s
 
 
 @kernel

@@ -9,6 +9,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
+from coramp.motion.lane_change import lane_change_s
 from coramp.records.outcome import Outcome, Passages, Pieces
 from coramp.scenarios.model import Scenario
 
@@ -54,7 +55,7 @@ def cooperative_outcome(
     entry_s[vehicle_of_row] = entry_step * step_s
     merge_s[vehicle_of_row] = ledger.book.merge_time_s[: len(ledger)]
     if driven is not None:
-        merge_s = np.ceil(merge_s / step_s - 1e-6) * step_s
+        merge_s = lane_change_s(merge_s, step_s)
     exit_s[vehicle_of_row] = ledger.book.exit_s[: len(ledger)]
     error_m[vehicle_of_row] = plan_error_m
     merge_s[merge_s > end_s] = np.nan
