@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.checker.distances import TRAITS, passes_s
+from coramp.checker.distances import CLOCK, LENGTH, POSITIONING, TIME_GAP, TRAITS, passes_s
 from coramp.checker.pairs import Way
 
 FIRST, COUNT = range(2)
@@ -112,7 +112,14 @@ def way_of(record: Record, row: int) -> Way:
     """Returns what a row drives from its last command on, and until that takes effect."""
     first = record.places[row, FIRST]
     pieces = record.pieces[first : first + record.places[row, COUNT]]
-    return Way(pieces, record.traits[row], record.times_s[row, MERGE])
+    return Way(
+        pieces,
+        record.times_s[row, MERGE],
+        record.traits[row, LENGTH],
+        record.traits[row, POSITIONING],
+        record.traits[row, CLOCK],
+        record.traits[row, TIME_GAP],
+    )
 
 
 @kernel

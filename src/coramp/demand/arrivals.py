@@ -10,7 +10,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.plant import STREAMS, Arrival
 from coramp.scenarios.model import Mainline, Ramp, Scenario, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
-from coramp.vehicles.traits import Traits
+from coramp.vehicles.traits import CAR, Traits
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:
@@ -90,10 +90,17 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
             *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
     numbers = (count(1), count(1))
+    given.sort(key=_in_order)
     return [
         Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, *rest)
-        for _, on_ramp, rest in sorted(given, key=lambda a: (*a[:2], *a[2][1:3]))
+        for _, on_ramp, rest in given
     ]
+
+
+def _in_order(arrival: "Unnamed") -> tuple[int, bool, float, float]:
+    """By time, the mainline first; then by speed and length, where a stream has two at once."""
+    step, on_ramp, rest = arrival
+    return step, on_ramp, rest[1], rest[2]
 
 
 def _name(on_ramp: bool, number: int) -> str:
@@ -148,6 +155,12 @@ def _stream_arrivals(
     low_mps, high_mps = stream.entry_speed_mps
     speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
     steps = np.rint(times_s / step_s).astype(np.int64)
+    if isinstance(scenario.vehicle, Vehicle):
+        length_m = scenario.vehicle.length_m
+        return [
+            (step, on_ramp, (step, speed_mps, length_m, CAR, None))
+            for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
+        ]
     kinds = kinds_of(scenario, on_ramp, len(times_s), seed)
     return [
         (step, on_ramp, _rest(scenario, kind, step, speed_mps, top_mps))

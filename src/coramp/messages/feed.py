@@ -1,7 +1,7 @@
 """The growing list of requests to enter that a world offers the coordinator, in order of time."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ class RequestFeed:
             np.array([request.on_ramp for request in listed], np.bool_),
             np.array([request.speed_mps for request in listed], np.float64),
             np.array([request.length_m for request in listed], np.float64),
-            np.array([_traits_row(request) for request in listed]).reshape(-1, len(UNBOUND)),
+            _traits_rows(listed),
         )
         if (np.diff(self.arrays.step) < 0).any():
             raise ValueError("requests must come in order of time")
@@ -67,6 +67,14 @@ class RequestFeed:
         arrays.speed_mps[place], arrays.length_m[place] = numbers
         arrays.traits[place] = _traits_row(request)
         self._list.append(request)
+
+
+def _traits_rows(requests: Sequence[RequestToEnter]) -> FloatArray:
+    rows = np.full((len(requests), len(UNBOUND)), math.nan)
+    for place, request in enumerate(requests):
+        if request.traits is not None:
+            rows[place] = request.traits
+    return rows
 
 
 def _traits_row(request: RequestToEnter) -> tuple[float, ...]:
