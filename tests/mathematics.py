@@ -155,7 +155,6 @@ def fleet_of(*vehicles, live=None):
         piece_count=np.array(counts),
         length_m=np.array([vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]),
         merge_time_s=np.array([vehicle[1] for vehicle in vehicles]),
-        lowest_m=np.array([low_m for low_m, _ in ranges]),
-        highest_m=np.array([high_m for _, high_m in ranges]),
+        intercepts_m=np.array(ranges),
         live=np.arange(len(rows)) if live is None else np.array(live),
     )
