@@ -131,8 +131,10 @@ class RunTables:
         return None if told is None else as_frame(told, self.scenario.control.step_s)
 
     @cached_property
-    def types(self) -> pl.DataFrame:
-        """One row per type of vehicle and stream."""
+    def types(self) -> pl.DataFrame | None:
+        """One row per type of vehicle and stream, where there is more than one type."""
+        if len(self.scenario.vehicle_types) == 1:
+            return None
         columns = self.vehicle_columns
         rows = type_figures(
             self.outcome.passages, columns["delay_s"], columns["fuel_l"], columns["finished"]
