@@ -9,7 +9,16 @@ from coramp.errors import CorampError
 from coramp.records.schemas import Row
 from coramp.scenarios.model import Scenario
 
-TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations", "types")
+TABLES = (
+    "vehicles",
+    "trajectories",
+    "decisions",
+    "speeds",
+    "positions",
+    "violations",
+    "types",
+    "attempts",
+)
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
 MESSAGES = "messages"
 """The log of messages lies beside them where it was to be kept; only the audit reads it back."""
@@ -21,7 +30,7 @@ class RunRecords:
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
-    positions and figures by type are None where a coramp that kept none wrote the run, messages
+    positions, figures by type and attempts are None where a coramp that kept none wrote the run, messages
     where they were not to be kept, and in a run that was read.
     """
 
@@ -35,6 +44,7 @@ class RunRecords:
     violations: pl.DataFrame | None = None
     messages: pl.DataFrame | None = None
     types: pl.DataFrame | None = None
+    attempts: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:

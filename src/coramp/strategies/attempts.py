@@ -76,30 +76,27 @@ class Attempt(NamedTuple):
 class Tried(Sequence[Attempt]):
     """The attempts of a decision as its kernels wrote them; each is put into words when read.
 
-    ``left_out`` is how many more there were before the last one, for which there was no room.
+    Of more attempts than a trace has room for, the first and the last one are kept.
     """
 
-    __slots__ = ("_head", "_rows", "left_out")
+    __slots__ = ("_trace",)
 
     def __init__(self, trace: FloatArray) -> None:
-        count = int(trace[0, t.COUNT])
-        kept = min(count, len(trace) - 1)
-        self._head: FloatArray = trace[0].copy()
-        self._rows: FloatArray = trace[1 : kept + 1].copy()
-        self.left_out = count - kept
+        self._trace: FloatArray = trace[: int(trace[0, t.COUNT]) + 1].copy()
 
     def __len__(self) -> int:
-        return len(self._rows)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Tried) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
+        return len(self._trace) - 1
 
     @property
-    def _key(self) -> tuple[bytes, bytes]:
-        return self._head.tobytes(), self._rows.tobytes()
+    def left_out(self) -> int:
+        """How many attempts there were before the last one for which there was no room."""
+        return int(self._trace[0, t.COUNT]) - len(self)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Tried) and self._trace.tobytes() == other._trace.tobytes()
+
+    def __hash__(self) -> int:
+        return hash(self._trace.tobytes())
 
     @overload
     def __getitem__(self, place: int) -> Attempt: ...
@@ -107,11 +104,11 @@ class Tried(Sequence[Attempt]):
     def __getitem__(self, place: slice) -> Sequence[Attempt]: ...
     def __getitem__(self, place: int | slice) -> Attempt | Sequence[Attempt]:
         if isinstance(place, slice):
-            return [self._attempt(row) for row in self._rows[place]]
-        return self._attempt(self._rows[place])
+            return [self._attempt(row) for row in self._trace[1:][place]]
+        return self._attempt(self._trace[1:][place])
 
     def __iter__(self) -> Iterator[Attempt]:
-        return map(self._attempt, self._rows)
+        return map(self._attempt, self._trace[1:])
 
     def _attempt(self, row: FloatArray) -> Attempt:
         return Attempt(
@@ -132,10 +129,10 @@ class Tried(Sequence[Attempt]):
             ahead_m=float(row[t.AHEAD]),
             back_m=float(row[t.BACK]),
             moves_from_s=float(row[t.MOVES_FROM_S]),
-            free_accel_mps2=float(self._head[t.FREE_ACCEL]),
-            length_m=float(self._head[t.OWN_LENGTH]),
+            free_accel_mps2=float(self._trace[0, t.FREE_ACCEL]),
+            length_m=float(self._trace[0, t.OWN_LENGTH]),
             front_length_m=float(row[t.FRONT_LENGTH]),
-            clearance_m=float(self._head[t.CLEARANCE]),
+            clearance_m=float(self._trace[0, t.CLEARANCE]),
         )
 
 

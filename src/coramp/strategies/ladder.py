@@ -54,9 +54,7 @@ def plan_of(
     """Returns the plan that a rung's merge amounts to; ``gap`` is -1 for a hold."""
     order, gap = situation.order, merge.gap
     own_length_m = fleet.length_m[situation.subject]
-    note_subject(
-        proposal.trace, situation.free_accel_mps2, own_length_m, situation.clearance_m
-    )
+    note_subject(proposal.trace, situation.free_accel_mps2, own_length_m, situation.clearance_m)
     if gap >= 0:
         front_length_m = fleet.length_m[order[gap - 1]] if gap > 0 else math.nan
         note_choice(proposal.trace, rung, scenario, front_length_m)
@@ -151,7 +149,9 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
         for k in range(int(proposal.size[0]))
     )
     follow_up = ((view.time_s, behind),) if behind in waiting else ()
-    return Decision(commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan, proposal),))
+    return Decision(
+        commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan, proposal),)
+    )
 
 
 def explanation(row: int, plan: MergePlan, proposal: Proposal) -> Explanation:

@@ -233,9 +233,7 @@ def refuse_gap(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int)
     hold up a vehicle that is yet to enter.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
-    rear_known = (
-        gap < len(situation.order) and situation.intercepts_m[gap] >= situation.known_m
-    )
+    rear_known = gap < len(situation.order) and situation.intercepts_m[gap] >= situation.known_m
     if low_m > min(high_m, situation.highest_m) and not rear_known:
         missing_m = low_m - min(high_m, situation.highest_m)
         refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, missing_m)

@@ -327,9 +327,7 @@ def merges_safely(
     """
     merge_s, merge_m = propose_merge(proposal, situation.subject, approach, accel_mps2, rules)
     nose = approach[len(approach) - 1]
-    note_merge(
-        proposal.trace, place.slot_m, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED]
-    )
+    note_merge(proposal.trace, place.slot_m, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED])
     note_moves(proposal.trace, 0.0, 0.0, situation.from_s)
     if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
         past_m = merge_m - rules.road.last_merge_station_m

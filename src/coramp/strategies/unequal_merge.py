@@ -148,9 +148,7 @@ def try_merge(
         return no_unequal_merge()
     merge_m, merge_mps = station_and_speed(base[:m], merge_s)
     nose = approach[len(approach) - 1]
-    note_merge(
-        proposal.trace, math.nan, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED]
-    )
+    note_merge(proposal.trace, math.nan, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED])
     front = order[place - 1] if place > 0 else -1
     rear = order[place] if place < len(order) else -1
     note_gap(proposal.trace, front, rear)
