@@ -30,8 +30,8 @@ class RunRecords:
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
-    positions, figures by type and attempts are None where a coramp that kept none wrote the run, messages
-    where they were not to be kept, and in a run that was read.
+    positions, figures by type and attempts are None where a coramp that kept none wrote the run,
+    messages where they were not to be kept, and in a run that was read.
     """
 
     content: Row
@@ -51,6 +51,14 @@ class RunRecords:
         """The tables that there are, by name."""
         every = {name: getattr(self, name) for name in (*TABLES, MESSAGES)}
         return {name: frame for name, frame in every.items() if frame is not None}
+
+    @cached_property
+    def attempts_of(self) -> dict[tuple[str, float], list[Row]]:
+        """What was tried, in order, by vehicle and time of the decision; empty if not kept."""
+        found: dict[tuple[str, float], list[Row]] = {}
+        for row in [] if self.attempts is None else self.attempts.rows(named=True):
+            found.setdefault((row["vehicle_id"], row["time_s"]), []).append(row)
+        return found
 
     @cached_property
     def scenario(self) -> Scenario:

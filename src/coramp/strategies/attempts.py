@@ -45,9 +45,9 @@ class Attempt(NamedTuple):
     ``other_row``, by ``missing_m``. Where a vehicle that moves aside, and not the subject, comes
     too near to it, that is ``moved_row``. The subject would pass the nose at ``nose_time_s`` and
     cruise at ``intercept_m`` + v0 t. The vehicles before and behind the gap would move by
-    ``ahead_m`` and ``back_m`` from ``moves_from_s`` on. Free movement's acceleration, the lengths of
-    the subject and of the vehicle ahead, and the clearance that is planned on either side are what
-    the equations of the merge rest on.
+    ``ahead_m`` and ``back_m`` from ``moves_from_s`` on. The equations of the merge rest on free
+    movement's acceleration, the lengths of the subject and of the vehicle ahead, and the clearance
+    that is planned on either side.
     """
 
     rung: str
