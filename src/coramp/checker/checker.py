@@ -14,7 +14,13 @@ from coramp.checker.distances import (
     Bounds,
     state_at,
 )
-from coramp.checker.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
+from coramp.checker.pairs import (
+    Way,
+    envelope_on_mainline,
+    examine_pair,
+    surely_apart,
+    way_with,
+)
 from coramp.checker.reasons import (
     ACCEPTED,
     BACKWARDS,
@@ -116,13 +122,13 @@ def examine_entry(record: Record, entry: Entry, pieces: FloatArray, bounds: Boun
     if code == ACCEPTED:
         code = _examine_end(pieces, merge_s, bounds)
     if code == ACCEPTED:
-        mine = Way(pieces, entry.traits, merge_s)
-        code = _examine_speeds(mine, pieces, False, -math.inf, bounds)
+        made_s = -math.inf
+        code = _examine_speeds(pieces, merge_s, entry.traits, pieces, False, made_s, bounds)
     if code == ACCEPTED:
-        code = _examine_accelerations(mine, bounds)
+        code = _examine_accelerations(pieces, merge_s, entry.traits, bounds)
     if code != ACCEPTED:
         return Verdict(code, -1, -1, math.nan)
-    mine = Way(pieces, entry.traits, merge_s)
+    mine = way_with(pieces, merge_s, entry.traits)
     nobody = np.empty(0, np.int64)
     code, other, least = _examine_against_others(record, nobody, -1, mine, math.inf, bounds)
     return Verdict(code, -1, other, least)
@@ -152,7 +158,7 @@ def _examine_against_others(
 @kernel
 def _changed_way(record: Record, change: Change, k: int) -> Way:
     pieces = change.pieces[k, : change.piece_count[k]]
-    return Way(pieces, record.traits[change.rows[k]], change.merge_s[k])
+    return way_with(pieces, change.merge_s[k], record.rows[change.rows[k]])
 
 
 @kernel
@@ -184,10 +190,12 @@ def _examine_command(
     if code == ACCEPTED:
         makes_gap = change.makes_gap[k] == 1
         gap_made_s = _last_merge_s(change)
-        mine = Way(pieces, before.traits, merge_s)
-        code = _examine_speeds(mine, before.pieces, makes_gap, gap_made_s, bounds)
+        traits = record.rows[change.rows[k]]
+        code = _examine_speeds(
+            pieces, merge_s, traits, before.pieces, makes_gap, gap_made_s, bounds
+        )
     if code == ACCEPTED:
-        code = _examine_accelerations(Way(pieces, before.traits, merge_s), bounds)
+        code = _examine_accelerations(pieces, merge_s, record.rows[change.rows[k]], bounds)
     return code
 
 
@@ -252,14 +260,19 @@ def _examine_end(pieces: FloatArray, merge_s: float, bounds: Bounds) -> int:
 
 @kernel
 def _examine_speeds(
-    mine: Way, before: FloatArray, makes_gap: bool, gap_made_s: float, bounds: Bounds
+    pieces: FloatArray,
+    merge_s: float,
+    traits: FloatArray,
+    before: FloatArray,
+    makes_gap: bool,
+    gap_made_s: float,
+    bounds: Bounds,
 ) -> int:
     """``before`` is what was commanded until now; the gap is made by ``gap_made_s``.
 
     No vehicle is commanded more than its own top speed, but for one that enters faster.
     """
-    pieces, merge_s, v0 = mine.pieces, mine.merge_s, bounds.mainline_speed_mps
-    top_mps, entered_mps = mine.traits[TOP_SPEED], pieces[0, 2]
+    v0, top_mps, entered_mps = bounds.mainline_speed_mps, traits[TOP_SPEED], pieces[0, 2]
     for i in range(len(pieces)):
         t, s, v, _ = pieces[i]
         if v < -EXACT:
@@ -288,9 +301,10 @@ def _last_merge_s(change: Change) -> float:
 
 
 @kernel
-def _examine_accelerations(mine: Way, bounds: Bounds) -> int:
+def _examine_accelerations(
+    pieces: FloatArray, merge_s: float, traits: FloatArray, bounds: Bounds
+) -> int:
     """A vehicle of limited power P per mass may speed up by P / v at the end of each piece."""
-    pieces, merge_s, traits = mine.pieces, mine.merge_s, mine.traits
     for i in range(len(pieces)):
         t, s, v, a = pieces[i]
         most_mps2 = min(bounds.comfort_mps2, traits[BRAKING])

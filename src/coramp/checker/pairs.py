@@ -5,15 +5,17 @@ from typing import NamedTuple
 
 from coramp._kernel import FloatArray, kernel
 from coramp.checker.distances import (
+    CLOCK,
     LENGTH,
     POSITIONING,
+    TIME_GAP,
     Bounds,
     Envelope,
+    Needs,
     envelope_of,
     lane_change_distance_m,
     least_margin_m,
     margin_at_least_m,
-    needs_of,
     passes_s,
     state_at,
 )
@@ -21,11 +23,43 @@ from coramp.checker.reasons import ACCEPTED, EXACT, TOO_NEAR, TOO_NEAR_AT_MERGE
 
 
 class Way(NamedTuple):
-    """One vehicle's trajectory, traits and merge time (minus infinity on the mainline)."""
+    """One vehicle's trajectory and merge time (minus infinity on the mainline).
+
+    With them come its length, its errors of Eq. 1 and its time gap as a follower: as numbers, since
+    kernels handle these faster than an array.
+    """
 
     pieces: FloatArray
-    traits: FloatArray
     merge_s: float
+    length_m: float
+    positioning_error_m: float
+    clock_error_s: float
+    time_gap_s: float
+
+
+@kernel
+def way_with(pieces: FloatArray, merge_s: float, traits: FloatArray) -> Way:
+    """Returns the way of a vehicle with these traits (columns of ``distances``)."""
+    return Way(
+        pieces,
+        merge_s,
+        traits[LENGTH],
+        traits[POSITIONING],
+        traits[CLOCK],
+        traits[TIME_GAP],
+    )
+
+
+@kernel
+def needs_between(front: Way, rear: Way) -> Needs:
+    """Returns what two vehicles need of each other."""
+    return Needs(
+        front.length_m,
+        front.positioning_error_m + rear.positioning_error_m,
+        front.clock_error_s,
+        rear.clock_error_s,
+        rear.time_gap_s,
+    )
 
 
 @kernel
@@ -84,10 +118,10 @@ def surely_apart(
         return True
     envelope = envelope_of(theirs.pieces, start_s, bounds.mainline_speed_mps)
     if my_envelope.lowest_m >= envelope.highest_m:
-        needs = needs_of(mine.traits, theirs.traits)
+        needs = needs_between(mine, theirs)
         at_least = margin_at_least_m(my_envelope, envelope, needs, bounds)
     else:
-        needs = needs_of(theirs.traits, mine.traits)
+        needs = needs_between(theirs, mine)
         at_least = margin_at_least_m(envelope, my_envelope, needs, bounds)
     return at_least > max(least, bounds.allowance_m)
 
@@ -98,7 +132,7 @@ def _least_of_pair_m(mine: Way, theirs: Way, start_s: float, end_s: float, bound
     their_station_m, _, _ = state_at(theirs.pieces, start_s)
     front, rear = (mine, theirs) if my_station_m > their_station_m else (theirs, mine)
     until_s = min(end_s, passes_s(front.pieces, bounds.zone_end_m))
-    needs = needs_of(front.traits, rear.traits)
+    needs = needs_between(front, rear)
     return least_margin_m(front.pieces, rear.pieces, start_s, until_s, needs, bounds)
 
 
@@ -106,8 +140,8 @@ def _least_of_pair_m(mine: Way, theirs: Way, start_s: float, end_s: float, bound
 def _margin_at_merge_m(merging: Way, other: Way, merge_s: float, bounds: Bounds) -> float:
     s_merging, v_merging, _ = state_at(merging.pieces, merge_s)
     s_other, v_other, _ = state_at(other.pieces, merge_s)
-    errors_m = merging.traits[POSITIONING] + other.traits[POSITIONING]
+    errors_m = merging.positioning_error_m + other.positioning_error_m
     needed_m = lane_change_distance_m(v_merging, v_other, errors_m, bounds)
     if s_other > s_merging:
-        return float(s_other - other.traits[LENGTH] - s_merging - needed_m)
-    return float(s_merging - merging.traits[LENGTH] - s_other - needed_m)
+        return float(s_other - other.length_m - s_merging - needed_m)
+    return float(s_merging - merging.length_m - s_other - needed_m)

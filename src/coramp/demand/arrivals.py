@@ -3,6 +3,7 @@
 import math
 import zlib
 from itertools import count
+from operator import itemgetter
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.plant import STREAMS, Arrival
 from coramp.scenarios.model import Mainline, Ramp, Scenario, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
-from coramp.vehicles.traits import Traits
+from coramp.vehicles.traits import CAR, Traits
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:
@@ -90,9 +91,10 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
             *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
     numbers = (count(1), count(1))
+    given.sort(key=IN_ORDER)
     return [
-        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, *rest)
-        for _, on_ramp, rest in sorted(given, key=lambda a: (*a[:2], *a[2][1:3]))
+        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, mps, length_m, kind, traits)
+        for step, on_ramp, mps, length_m, kind, traits in given
     ]
 
 
@@ -100,10 +102,10 @@ def _name(on_ramp: bool, number: int) -> str:
     return f"{'r' if on_ramp else 'm'}{number:05d}"
 
 
-Rest = tuple[int, float, float, str, Traits | None]
-"""Of an arrival: step, speed (m/s), length (m), type, traits."""
-Unnamed = tuple[int, bool, Rest]
-"""An arrival without its name: step, by the ramp or not, and the rest."""
+Unnamed = tuple[int, bool, float, float, str, Traits | None]
+"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m), type, traits."""
+IN_ORDER = itemgetter(0, 1, 2, 3)
+"""By time, the mainline first; then by speed and length, where a stream has two at once."""
 
 
 def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
@@ -112,26 +114,25 @@ def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
         kind = scenario.type_named(arrival.type or "")
         top_mps = arrival.top_speed_mps or 0.5 * sum(kind.top_speeds_mps)
         step = round(arrival.time_s / scenario.control.step_s)
-        rest = _rest(scenario, kind, step, arrival.speed_mps, top_mps, arrival.length_m)
-        found.append((step, arrival.stream == "ramp", rest))
+        rest = _rest(scenario, kind, arrival.speed_mps, top_mps, arrival.length_m)
+        found.append((step, arrival.stream == "ramp", *rest))
     return found
 
 
 def _rest(
     scenario: Scenario,
     kind: VehicleType,
-    step: int,
     speed_mps: float,
     top_mps: float,
     length_m: float | None = None,
-) -> Rest:
+) -> tuple[float, float, str, Traits | None]:
     """Returns an arrival of a type; nobody enters faster than it can drive."""
     length_m = kind.length_m if length_m is None else length_m
     traits = None
     if not isinstance(scenario.vehicle, Vehicle) or not math.isinf(top_mps):
         own = kind.traits(scenario.usual_traits(length_m), top_mps)
         traits = own._replace(length_m=length_m)
-    return step, min(speed_mps, top_mps), length_m, kind.name, traits
+    return min(speed_mps, top_mps), length_m, kind.name, traits
 
 
 def _stream_arrivals(
@@ -148,9 +149,15 @@ def _stream_arrivals(
     low_mps, high_mps = stream.entry_speed_mps
     speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
     steps = np.rint(times_s / step_s).astype(np.int64)
+    if isinstance(scenario.vehicle, Vehicle):
+        length_m = scenario.vehicle.length_m
+        return [
+            (step, on_ramp, speed_mps, length_m, CAR, None)
+            for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
+        ]
     kinds = kinds_of(scenario, on_ramp, len(times_s), seed)
     return [
-        (step, on_ramp, _rest(scenario, kind, step, speed_mps, top_mps))
+        (step, on_ramp, *_rest(scenario, kind, speed_mps, top_mps))
         for step, speed_mps, (kind, top_mps) in zip(
             steps.tolist(), speeds_mps.tolist(), kinds, strict=True
         )
