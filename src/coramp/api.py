@@ -11,6 +11,7 @@ import polars as pl
 from coramp.errors import CorampError
 from coramp.explain.decision import quantities
 from coramp.explain.quantity import Quantity
+from coramp.explain.words import NOT_TOLD, tried_lines
 from coramp.records.files import made_folder
 from coramp.records.run_folder import SUMO, not_replaceable, write_run
 from coramp.records.staging import staged_folder
@@ -108,6 +109,11 @@ class PlanResult(PlanPlots):
         return self.planned.decisions
 
     @property
+    def attempts(self) -> pl.DataFrame:
+        """One row an attempt of a decision, as in ``attempts.parquet``."""
+        return self.planned.attempts
+
+    @property
     def trajectories(self) -> pl.DataFrame:
         """What every vehicle drives after the decisions, one row a piece."""
         return self.planned.after
@@ -123,7 +129,13 @@ class PlanResult(PlanPlots):
         if rows.is_empty():
             known = ", ".join(self.decisions["vehicle_id"])
             raise CorampError(f"{vehicle_id}: was not planned; planned were {known}")
-        return quantities(rows.row(0, named=True), self.planned.scenario)
+        attempts = self.attempts.filter(vehicle_id=vehicle_id).rows(named=True)
+        return quantities(rows.row(0, named=True), attempts, self.planned.scenario.rules())
+
+    def tried(self, vehicle_id: str) -> list[str]:
+        """Returns what was tried for a ramp vehicle and why it was refused, line by line."""
+        attempts = self.attempts.filter(vehicle_id=vehicle_id).rows(named=True)
+        return tried_lines(attempts) or [NOT_TOLD]
 
     def to_pandas(self) -> dict[str, "pd.DataFrame"]:
         """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""

@@ -102,7 +102,7 @@ def test_examples_in_docstrings_work(module):
 
 
 def test_a_run_gives_frames_with_the_columns_of_its_files(cooperative, uncontrolled):
-    assert set(cooperative.frames) == set(SCHEMAS) - {"positions"}
+    assert set(cooperative.frames) == set(SCHEMAS) - {"positions", "types"}
     assert set(uncontrolled.frames) == {"vehicles", "speeds", "positions", "violations"}
     assert uncontrolled.trajectories is None
     assert uncontrolled.decisions is None

@@ -12,6 +12,7 @@ from coramp.coordination.guard import strategy_to_run
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.log import ACKNOWLEDGEMENT, READING, SIGNAL
+from coramp.metrics.attempts import attempts_table
 from coramp.metrics.tables import decisions_table
 from coramp.strategies.base import period_of, steps_of_period
 from coramp.strategies.situation import RUNGS
@@ -190,7 +191,10 @@ def check_records(inputs: Inputs, again: Replayed) -> list[Check]:
         raise CorampError(f"{inputs.folder}: is not complete; run again with the same --out")
     told = inputs.run.decisions
     if not told.equals(due):
-        findings.append(Finding("decisions.parquet", _first_other(told, due)))
+        findings.append(Finding("decisions.parquet", _first_other(told, due, "decision")))
+    tried = attempts_table(
+        coordinator.decisions, coordinator.refusals, names, coordinator.entered()[0]
+    )
     served = {rung: set() for rung in RUNGS}  # type: dict[str, set[int]]
     adjusted: set[int] = set()
     for decision in coordinator.decisions:
@@ -216,15 +220,26 @@ def check_records(inputs: Inputs, again: Replayed) -> list[Check]:
     ]
     return [
         judged("decisions.parquet", f"{due.height} explained decisions", findings),
+        *_check_attempts(inputs.run.attempts, tried),
         judged("counts of refusals, rungs and adjusted vehicles", "of a fresh coordinator", wrong),
     ]
 
 
-def _first_other(told: pl.DataFrame, due: pl.DataFrame) -> str:
+def _check_attempts(told: pl.DataFrame | None, due: pl.DataFrame) -> list[Check]:
+    """Compares what was tried; a run of a coramp that kept no attempts has nothing to compare."""
+    if told is None:
+        return []
+    findings = []
+    if not told.equals(due):
+        findings.append(Finding("attempts.parquet", _first_other(told, due, "attempt")))
+    return [judged("attempts.parquet", f"{due.height} attempts of these decisions", findings)]
+
+
+def _first_other(told: pl.DataFrame, due: pl.DataFrame, what: str) -> str:
     if told.schema != due.schema or told.height != due.height:
-        return f"there are {due.height} decisions; the file has {told.height}"
+        return f"there are {due.height} {what}s; the file has {told.height}"
     for k in range(due.height):
         if not told[k].equals(due[k]):
             row = due.row(k, named=True)
-            return f"the decision about {row['vehicle_id']} at {row['time_s']:.3f} s is another"
+            return f"the {what} about {row['vehicle_id']} at {row['time_s']:.3f} s is another"
     return "columns are others"

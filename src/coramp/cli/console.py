@@ -16,7 +16,8 @@ from rich.table import Table as RichTable
 from coramp.api import PlanResult, RunResult, StudyResult
 from coramp.audit.verdicts import Audit
 from coramp.cli.run_table import run_table
-from coramp.explain.quantity import Quantity
+from coramp.equations.printed import in_words
+from coramp.explain.quantity import Quantity, printed_equations
 from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
 from coramp.runs.running import finite_or_none
@@ -112,14 +113,39 @@ def quantity_table(title: str, quantities: list[Quantity]) -> Table:
     return Table(title, ("Eq.", "symbol", "what", "value"), rows)
 
 
+def print_quantities(title: str, quantities: list[Quantity]) -> None:
+    """Prints the quantities of a decision as a table, if there are any."""
+    if quantities:
+        print_table(quantity_table(title, quantities))
+
+
+def print_equations(quantities: list[Quantity]) -> None:
+    """Prints the equations of quantities as the paper prints them, once each."""
+    printed = printed_equations(quantities)
+    if printed:
+        print("Equations, as the paper prints them:")
+    for equation, text in printed.items():
+        print(f"  Eq. {equation}: {text}")
+
+
+def print_tried(title: str, lines: list[str]) -> None:
+    """Prints what was tried for a decision, one line an attempt."""
+    print(f"{title}:")
+    for line in lines:
+        print(f"  {line}")
+
+
 def print_plan(result: PlanResult) -> None:
     """Prints each ramp vehicle's decision with its quantities, then who was moved."""
     for decision in result.decisions.iter_rows(named=True):
         vehicle_id = decision["vehicle_id"]
         print(f"{vehicle_id}: {told(decision)}.")
+        print_tried(f"Tried for {vehicle_id}", result.tried(vehicle_id))
         title = f"{vehicle_id}, rung {decision['rung']}"
-        print_table(quantity_table(title, result.quantities(vehicle_id)))
+        print_quantities(title, result.quantities(vehicle_id))
         print(f"{_checked(decision['min_margin_m'])}\n")
+    vehicles = result.decisions["vehicle_id"].to_list()
+    print_equations([q for name in vehicles for q in result.quantities(name)])
 
 
 def _checked(margin_m: float | None) -> str:
@@ -136,7 +162,11 @@ def plan_json(result: PlanResult) -> Row:
         "snapshot": result.planned.snapshot.name,
         "strategy": result.planned.strategy,
         "decisions": [
-            {**row, "quantities": [_quantity_json(q) for q in result.quantities(row["vehicle_id"])]}
+            {
+                **row,
+                "tried": result.tried(row["vehicle_id"]),
+                "quantities": [_quantity_json(q) for q in result.quantities(row["vehicle_id"])],
+            }
             for row in result.decisions.iter_rows(named=True)
         ],
         "trajectories": result.trajectories.to_dicts(),
@@ -150,6 +180,7 @@ def _quantity_json(quantity: Quantity) -> Row:
         "meaning": quantity.meaning,
         "value": quantity.value,
         "unit": quantity.unit,
+        "printed": [in_words(equation) for equation in quantity.numbers],
     }
 
 
@@ -167,6 +198,7 @@ def print_story(story: Story) -> None:
         )
         print(f"  {number(vehicle['entry_s'], 1)} s: enters{waited}")
     events = [(c.decision["time_s"], c.text) for c in story.chapters]
+    events += [(plan.time_s, plan.text) for plan in story.refused]
     events += [(row["time_s"], _moved(row)) for row in story.moved_for]
     for time_s, text in sorted(events):
         print(f"  {number(time_s, 1)} s: {text}")
@@ -180,8 +212,11 @@ def print_story(story: Story) -> None:
     print()
     for chapter in story.chapters:
         when, rung = number(chapter.decision["time_s"], 1), chapter.decision["rung"]
-        title = f"{name}, decision at {when} s, rung {rung}"
-        print_table(quantity_table(title, chapter.quantities))
+        print_tried(f"{name}, tried at {when} s", chapter.tried)
+        print_quantities(f"{name}, decision at {when} s, rung {rung}", chapter.quantities)
+    for plan in story.refused:
+        print_tried(f"{name}, tried at {number(plan.time_s, 1)} s and refused", plan.tried)
+    print_equations([quantity for chapter in story.chapters for quantity in chapter.quantities])
 
 
 def _moved(row: Row) -> str:
@@ -201,10 +236,12 @@ def story_json(story: Story) -> Row:
             {
                 **chapter.decision,
                 "told": chapter.text,
+                "tried": chapter.tried,
                 "quantities": [_quantity_json(q) for q in chapter.quantities],
             }
             for chapter in story.chapters
         ],
+        "refused": [dataclasses.asdict(plan) for plan in story.refused],
         "moved_for": story.moved_for,
     }
 

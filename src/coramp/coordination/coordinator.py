@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.checker.reasons import ACCEPTED, HOLDS_NEWCOMERS, REASONS
+from coramp.checker.checker import Verdict
+from coramp.checker.reasons import (
+    ACCEPTED,
+    HOLDS_NEWCOMERS,
+    REASONS,
+    TOO_NEAR,
+    TOO_NEAR_AT_MERGE,
+)
 from coramp.coordination.admission import (
     decision_due_s,
     plan_moving_up,
@@ -43,6 +50,7 @@ from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
 from coramp.road.rules import Rules, packed
+from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -70,11 +78,19 @@ class DecisionRecord:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A plan that the checker did not let pass; the vehicles kept their commitments."""
+    """A plan that the checker did not let pass; the vehicles kept their commitments.
+
+    ``other_row`` is the vehicle that it came too near to, by ``missing_m``; -1 and None for none.
+    ``tried`` is what had been tried for a plan, its last attempt the one refused. It is None for
+    entries, and where the plan before of the vehicle was refused for the same reason.
+    """
 
     time_s: float
     row: int
     reason: str
+    other_row: int = -1
+    missing_m: float | None = None
+    tried: Sequence[Attempt] | None = None
 
 
 class Coordinator:
@@ -98,6 +114,7 @@ class Coordinator:
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
         self.interventions = 0
+        self._last_refused: dict[int, tuple[int, int]] = {}
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
@@ -333,7 +350,7 @@ class Coordinator:
                 code = HOLDS_NEWCOMERS
             if code != ACCEPTED:
                 self.interventions += 1
-                self._refuse(subjects, step, code)
+                self._refuse(decision, subjects, step, verdict._replace(code=code))
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:
@@ -374,11 +391,27 @@ class Coordinator:
         if self._wakes.is_due(row):
             self._plan_when_due(row, pieces, step)
 
-    def _refuse(self, subjects: tuple[int, ...], step: int, code: int) -> None:
-        retry_s = step * self._step_s + self._rules.control.retry_s
-        retry_step = first_step_from(retry_s, self._step_s)
+    def _refuse(
+        self, decision: Decision, subjects: tuple[int, ...], step: int, verdict: Verdict
+    ) -> None:
+        time_s = step * self._step_s
+        retry_step = first_step_from(time_s + self._rules.control.retry_s, self._step_s)
+        tried = {told.row: told.tried for told in decision.explanations}
+        missing_m = self._rules.safety.execution_allowance_m - verdict.least_margin_m
         for row in subjects:
-            self._note_refusal(step, row, code)
+            cause = (verdict.code, verdict.other_row)
+            again = self._last_refused.get(row) == cause
+            self._last_refused[row] = cause
+            self.refusals.append(
+                Refusal(
+                    time_s,
+                    row,
+                    REASONS[verdict.code],
+                    verdict.other_row,
+                    missing_m if verdict.code in (TOO_NEAR, TOO_NEAR_AT_MERGE) else None,
+                    None if again else tried.get(row, ()),
+                )
+            )
             self._wakes.ask(retry_step, row)
 
     def _record(

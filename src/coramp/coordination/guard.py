@@ -9,6 +9,7 @@ import numpy as np
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError, printable
 from coramp.kinematics.trajectory import MAX_PIECES
+from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -165,6 +166,9 @@ def _wrong_inside(decision: Decision, live: set[int], now_s: float) -> str:
     rows = [command.row for command in decision.commands if hasattr(command, "row")]
     named = [*rows, *(row for _, row in decision.wakes_s)]
     named += [explanation.row for explanation in decision.explanations]
+    for explanation in decision.explanations:
+        for attempt in explanation.tried:
+            named += [row for row in _rows_of(attempt) if row != -1]
     if unknown := [row for row in named if not _is_row(row) or row not in live]:
         return f"commands an unknown vehicle, row {unknown[0]}"
     if len(set(rows)) < len(rows):
@@ -190,7 +194,20 @@ def _wrong_story(explanation: Explanation) -> str:
     rest = (explanation.conflict_row, explanation.front_row, explanation.rear_row)
     if not all(map(_is_row, rest)):
         return "explains itself by rows that are no whole numbers"
-    sum(map(float, explanation[2:]))  # raises for what is no number
+    sum(map(float, explanation[2:-1]))  # raises for what is no number
+    return next(filter(None, map(_wrong_attempt, explanation.tried)), "")
+
+
+def _rows_of(attempt: Attempt) -> tuple[int, int, int, int]:
+    return attempt.front_row, attempt.rear_row, attempt.other_row, attempt.moved_row
+
+
+def _wrong_attempt(attempt: Attempt) -> str:
+    if not isinstance(attempt, Attempt) or not isinstance(attempt.reason, str):
+        return f"tells {attempt!r} of what it tried; allowed are Attempts of strategies.attempts"
+    if attempt.rung not in RUNGS:
+        return f"tells of an attempt by rung {attempt.rung!r}; allowed are {', '.join(RUNGS)}"
+    sum(map(float, (attempt.scenario, *attempt[7:])))  # raises for what is no number
     return ""
 
 

@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.explain.decision import EVEN_M, quantities
+from coramp.explain.case import evenly
+from coramp.explain.decision import quantities
 from coramp.explain.own_limits import own_quantities
 from coramp.explain.quantity import Quantity
+from coramp.explain.words import NOT_KEPT, NOT_TOLD, reason_in_words, tried_lines, where
 from coramp.records.run import RunRecords, moved_for
 from coramp.records.run_folder import read_run
 from coramp.records.schemas import Row
@@ -15,19 +17,36 @@ from coramp.records.schemas import Row
 
 @dataclass(frozen=True)
 class Chapter:
-    """One decision about the vehicle, in a sentence, with the quantities behind it."""
+    """One decision about the vehicle: in a sentence, what was tried for it, and its quantities.
+
+    ``tried`` is one line an attempt, or one line that says why there are none.
+    """
 
     decision: Row
     text: str
+    tried: list[str]
     quantities: list[Quantity]
 
 
 @dataclass(frozen=True)
+class RefusedPlan:
+    """A plan that the checker refused: when, in a sentence, and what had been tried for it."""
+
+    time_s: float
+    text: str
+    tried: list[str]
+
+
+@dataclass(frozen=True)
 class Story:
-    """What happened to a vehicle: its passage, the decisions about it, those that moved it."""
+    """What happened to a vehicle: its passage, the decisions about it, those that moved it.
+
+    ``refused`` are the plans for it that the checker refused.
+    """
 
     vehicle: Row
     chapters: list[Chapter]
+    refused: list[RefusedPlan]
     moved_for: list[Row]
     run: Row
 
@@ -49,30 +68,60 @@ def story_in(run: RunRecords, vehicle_id: str, folder: Path | None = None) -> St
         vehicle, decisions = run.vehicle(vehicle_id), run.coordinated("explain")[1]
     except CorampError as error:
         raise CorampError(f"{folder}: {error}" if folder is not None else str(error)) from None
-    about = decisions.filter(vehicle_id=vehicle_id)
+    about = decisions.filter(vehicle_id=vehicle_id).rows(named=True)
     return Story(
         vehicle,
-        [
-            Chapter(row, told(row, run.scenario.vehicles_differ), quantities_in(run, row))
-            for row in about.iter_rows(named=True)
-        ],
+        [chapter_in(run, row) for row in about],
+        refused_plans(run, vehicle_id),
         moved_for(decisions, vehicle_id),
         {key: run.content[key] for key in ("scenario", "strategy", "seed", "run_id")},
     )
+
+
+def chapter_in(run: RunRecords, decision: Row) -> Chapter:
+    """Returns one decision of a run with what its records tell of it."""
+    return Chapter(
+        decision,
+        told(decision, run.scenario.vehicles_differ),
+        tried_in(run, decision),
+        quantities_in(run, decision),
+    )
+
+
+def attempts_for(run: RunRecords, decision: Row) -> list[Row]:
+    """Returns the attempts of a decision, in order; none where none were kept."""
+    return run.attempts_of.get((decision["vehicle_id"], decision["time_s"]), [])
+
+
+def tried_in(run: RunRecords, decision: Row) -> list[str]:
+    """Returns what was tried for a decision of a run, line by line."""
+    if run.attempts is None:
+        return [NOT_KEPT]
+    return tried_lines(attempts_for(run, decision)) or [NOT_TOLD]
+
+
+def refused_plans(run: RunRecords, vehicle_id: str) -> list[RefusedPlan]:
+    """Returns the plans for a vehicle of a run that the checker refused, in order of time."""
+    found = []
+    for (name, time_s), attempts in run.attempts_of.items():
+        if name == vehicle_id and attempts[-1]["checker_reason"] is not None:
+            text = reason_in_words(attempts[-1])
+            found.append(RefusedPlan(time_s, text, tried_lines(attempts)))
+    return found
 
 
 def quantities_in(run: RunRecords, decision: Row) -> list[Quantity]:
     """Returns the quantities behind a decision of a run: the paper's, or each vehicle's own."""
     if run.scenario.vehicles_differ:
         return own_quantities(decision, run)
-    return quantities(decision, run.scenario)
+    return quantities(decision, attempts_for(run, decision), run.scenario.rules())
 
 
 def accelerates_evenly(decision: Row) -> bool:
     """Returns whether a merge has one acceleration from the nose on, as the paper's have."""
     t2_s = decision["merge_time_s"] - decision["nose_time_s"]
-    even_m = decision["nose_speed_mps"] * t2_s + 0.5 * decision["accel_mps2"] * t2_s * t2_s
-    return bool(abs(even_m - decision["merge_station_m"]) < EVEN_M)
+    nose_mps, accel_mps2 = decision["nose_speed_mps"], decision["accel_mps2"]
+    return evenly(nose_mps, accel_mps2, t2_s, decision["merge_station_m"])
 
 
 def told(decision: dict[str, Any], vehicles_differ: bool = False) -> str:
@@ -80,16 +129,7 @@ def told(decision: dict[str, Any], vehicles_differ: bool = False) -> str:
 
     Where vehicles differ, a merge need not have one acceleration from the nose on.
     """
-    front, rear = decision["front_vehicle_id"], decision["rear_vehicle_id"]
-    match front, rear:
-        case None, None:
-            where = "onto an empty mainline"
-        case None, _:
-            where = f"ahead of {rear}"
-        case _, None:
-            where = f"behind {front}"
-        case _:
-            where = f"between {front} and {rear}"
+    place = where(decision["front_vehicle_id"], decision["rear_vehicle_id"])
     moved = ", ".join(decision["adjusted_vehicle_ids"] or [])
     match decision["rung"]:
         case "free" | "reach" if not (vehicles_differ or accelerates_evenly(decision)):
@@ -106,6 +146,6 @@ def told(decision: dict[str, Any], vehicles_differ: bool = False) -> str:
         case _:
             return "no merge is safe yet: it keeps its stop before the nose and is planned again"
     return (
-        f"{how} {where} at {decision['merge_time_s']:.2f} s, "
+        f"{how} {place} at {decision['merge_time_s']:.2f} s, "
         f"station {decision['merge_station_m']:.1f} m"
     )

@@ -13,6 +13,7 @@ from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
 from coramp.coordination.plant import STREAMS
 from coramp.messages.log import as_frame
+from coramp.metrics.attempts import attempts_table
 from coramp.metrics.fitting import fitted_pieces
 from coramp.metrics.lane_figures import bound_figures, braking_figures
 from coramp.metrics.lane_uses import lane_uses
@@ -86,6 +87,7 @@ class RunTables:
             "positions": self.positions,
             "violations": self.violations,
             "types": self.types,
+            "attempts": self.attempts,
             "messages": self.messages,
         }
         return {name: frame for name, frame in every.items() if frame is not None}
@@ -155,6 +157,15 @@ class RunTables:
         return decisions_table(
             outcome.decisions, outcome.passages.vehicle_id, outcome.vehicle_of_row
         )
+
+    @cached_property
+    def attempts(self) -> pl.DataFrame | None:
+        """One row an attempt of a decision."""
+        outcome = self.outcome
+        if not outcome.cooperative:
+            return None
+        names, of_row = outcome.passages.vehicle_id, outcome.vehicle_of_row
+        return attempts_table(outcome.decisions, outcome.refusals, names, of_row)
 
 
 def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:

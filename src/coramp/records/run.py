@@ -9,7 +9,16 @@ from coramp.errors import CorampError
 from coramp.records.schemas import Row
 from coramp.scenarios.model import Scenario
 
-TABLES = ("vehicles", "trajectories", "decisions", "speeds", "positions", "violations", "types")
+TABLES = (
+    "vehicles",
+    "trajectories",
+    "decisions",
+    "speeds",
+    "positions",
+    "violations",
+    "types",
+    "attempts",
+)
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
 MESSAGES = "messages"
 """The log of messages lies beside them where it was to be kept; only the audit reads it back."""
@@ -21,8 +30,9 @@ class RunRecords:
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
-    positions and figures by type (of runs with several types) are None where a coramp that kept
-    none wrote the run, messages where they were not to be kept, and in a run that was read.
+    positions, attempts and figures by type (of runs with several types) are None where a coramp
+    that kept none wrote the run, messages where they were not to be kept, and in a run that was
+    read.
     """
 
     content: Row
@@ -35,12 +45,21 @@ class RunRecords:
     violations: pl.DataFrame | None = None
     messages: pl.DataFrame | None = None
     types: pl.DataFrame | None = None
+    attempts: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:
         """The tables that there are, by name."""
         every = {name: getattr(self, name) for name in (*TABLES, MESSAGES)}
         return {name: frame for name, frame in every.items() if frame is not None}
+
+    @cached_property
+    def attempts_of(self) -> dict[tuple[str, float], list[Row]]:
+        """What was tried, in order, by vehicle and time of the decision; empty if not kept."""
+        found: dict[tuple[str, float], list[Row]] = {}
+        for row in [] if self.attempts is None else self.attempts.rows(named=True):
+            found.setdefault((row["vehicle_id"], row["time_s"]), []).append(row)
+        return found
 
     @cached_property
     def scenario(self) -> Scenario:

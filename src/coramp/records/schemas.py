@@ -82,6 +82,34 @@ DECISIONS: Schema = {
     "rear_station_m": pl.Float64,
 }
 
+ATTEMPTS: Schema = {
+    "time_s": pl.Float64,
+    "vehicle_id": pl.String,
+    "attempt": pl.Int64,
+    "rung": pl.String,
+    "scenario": pl.Int64,
+    "front_vehicle_id": pl.String,
+    "rear_vehicle_id": pl.String,
+    "reason": pl.String,
+    "checker_reason": pl.String,
+    "other_vehicle_id": pl.String,
+    "moved_vehicle_id": pl.String,
+    "missing_m": pl.Float64,
+    "intercept_m": pl.Float64,
+    "accel_mps2": pl.Float64,
+    "merge_time_s": pl.Float64,
+    "merge_station_m": pl.Float64,
+    "nose_time_s": pl.Float64,
+    "nose_speed_mps": pl.Float64,
+    "ahead_m": pl.Float64,
+    "back_m": pl.Float64,
+    "moves_from_s": pl.Float64,
+    "free_accel_mps2": pl.Float64,
+    "length_m": pl.Float64,
+    "front_length_m": pl.Float64,
+    "clearance_m": pl.Float64,
+}
+
 VIOLATIONS: Schema = {
     "time_s": pl.Float64,
     "front_vehicle_id": pl.String,

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from coramp.errors import CorampError
 from coramp.records.schemas import (
+    ATTEMPTS,
     DECISIONS,
     RESULT_VERSION,
     RUN_KEYS,
@@ -33,6 +34,7 @@ SCHEMAS: dict[str, Schema] = {
     "positions": TRAJECTORIES,
     "violations": VIOLATIONS,
     "types": TYPES,
+    "attempts": ATTEMPTS,
 }
 """The columns of a run's tables."""
 _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {

@@ -12,6 +12,7 @@ from coramp.coordination.guard import strategy_to_run
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.messages.feed import RequestFeed
+from coramp.metrics.attempts import attempts_table
 from coramp.metrics.tables import decisions_table
 from coramp.records.outcome import LANES
 from coramp.records.schemas import TRAJECTORIES
@@ -29,6 +30,7 @@ class PlannedSnapshot:
     scenario: Scenario
     strategy: str
     decisions: pl.DataFrame
+    attempts: pl.DataFrame
     before: pl.DataFrame
     after: pl.DataFrame
 
@@ -68,12 +70,13 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
             )
     before = _trajectories(coordinator, vehicles)
     coordinator.decide_now(0)
-    names = [vehicle.id for vehicle in vehicles]
+    names, rows = [vehicle.id for vehicle in vehicles], np.arange(len(vehicles))
     return PlannedSnapshot(
         snapshot,
         scenario,
         strategy,
-        decisions_table(coordinator.decisions, names, np.arange(len(names))),
+        decisions_table(coordinator.decisions, names, rows),
+        attempts_table(coordinator.decisions, coordinator.refusals, names, rows),
         before,
         _trajectories(coordinator, vehicles),
     )

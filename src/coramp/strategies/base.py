@@ -5,7 +5,7 @@ to be woken and, if it has a ``period_s``, once in each such period, then withou
 answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple, Protocol
@@ -14,6 +14,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.road.rules import Rules
+from coramp.strategies.attempts import Attempt
 from coramp.vehicles.fleet import Fleet
 
 
@@ -173,7 +174,7 @@ class Explanation(NamedTuple):
 
     Severities are in m2/s4. The last three are where conflict, front and rear vehicle would be at
     the decision if they had always cruised at v0 as they will in the end; that need not be where
-    they are.
+    they are. ``tried`` is every attempt in order, with the reason why it was refused.
     """
 
     row: int
@@ -197,6 +198,7 @@ class Explanation(NamedTuple):
     conflict_station_m: float
     front_station_m: float
     rear_station_m: float
+    tried: Sequence[Attempt] = ()
 
 
 Memory = Hashable

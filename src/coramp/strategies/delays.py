@@ -13,7 +13,7 @@ from coramp.road.rules import Rules
 from coramp.strategies.proposals import find_unsafe_pair, propose_merge, push_back
 from coramp.strategies.ramp_queue import longest_wait_s, next_behind_on_ramp, propose_stop
 from coramp.strategies.rungs import Merge, no_merge, unknown_bound_m
-from coramp.strategies.situation import Situation, gap_bounds_m, situation_from
+from coramp.strategies.situation import RUNG_DELAY, Situation, gap_bounds_m, situation_from
 from coramp.vehicles.fleet import (
     ROUNDING_M,
     Fleet,
@@ -22,6 +22,18 @@ from coramp.vehicles.fleet import (
     entry_of,
     pair_margin_m,
     proposed,
+)
+from coramp.vehicles.trace import (
+    FOLLOWERS_CANNOT_BRAKE,
+    GAP_TOO_SMALL,
+    HOLDS_UP_NEWCOMER,
+    NO_LATE_WAY,
+    PAST_LAST_STATION,
+    note_merge,
+    note_moves,
+    open_in_gap,
+    refuse,
+    refuse_as_too_near,
 )
 
 EVENLY, AT_ONCE, AT_THE_STOP = range(3)
@@ -89,17 +101,21 @@ def come_late(
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
     target_m = min(high_m, situation.free_m)
     back_m = max(0.0, low_m - target_m)
-    if back_m > room_m:
+    scenario = 2 if room_m > 0.0 else 0
+    open_in_gap(proposal.trace, RUNG_DELAY, scenario, situation.order, gap)
+    unknown_m = unknown_bound_m(fleet, situation)
+    if back_m > 0.0 and (gap == len(situation.order) or target_m < unknown_m):
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, unknown_m - target_m)
         return no_merge()
-    if back_m > 0.0 and (
-        gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
-    ):
+    if back_m > room_m:
+        refuse(proposal.trace, GAP_TOO_SMALL, -1, back_m - room_m)
         return no_merge()
     if longest_wait_s(rules) > 0.0:
         for way in (AT_ONCE, AT_THE_STOP):
             merge = come_late_by(fleet, proposal, situation, gap, way, target_m, back_m, rules)
             if merge.gap >= 0:
                 return merge
+            open_in_gap(proposal.trace, RUNG_DELAY, scenario, situation.order, gap)
     return come_late_by(fleet, proposal, situation, gap, EVENLY, target_m, back_m, rules)
 
 
@@ -118,11 +134,18 @@ def come_late_by(
     buffer = np.empty((MAX_PIECES, 4))
     n = late_way(fleet, situation, way, target_m, rules, buffer)
     if n == 0:
+        refuse(proposal.trace, NO_LATE_WAY, -1, math.nan)
         return no_merge()
     later = with_approach(situation, buffer[:n], rules)
     accel_mps2 = later.free_accel_mps2
     merge_s, merge_m = propose_merge(proposal, later.subject, later.approach, accel_mps2, rules)
+    note_merge(
+        proposal.trace, target_m, accel_mps2, merge_s, merge_m, later.nose_s, later.nose_speed_mps
+    )
+    note_moves(proposal.trace, 0.0, back_m, situation.from_s)
     if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
+        past_m = merge_m - rules.road.last_merge_station_m
+        refuse(proposal.trace, PAST_LAST_STATION, -1, past_m)
         return no_merge()
     if too_near_ahead(fleet, proposal, situation, gap, rules):
         return no_merge()
@@ -170,6 +193,8 @@ def too_near_ahead(
             rules,
         )
         if margin_m < rules.safety.execution_allowance_m - ROUNDING_M:
+            missing_m = rules.safety.execution_allowance_m - margin_m
+            refuse_as_too_near(proposal.trace, -1, other, missing_m)
             return True
     return False
 
@@ -242,5 +267,6 @@ def delay_followers(
             return True
         stop_m = stop_of_m(committed(fleet, follower))
         if not propose_stop(fleet, proposal, follower, stop_m, from_s, rules):
+            refuse(proposal.trace, FOLLOWERS_CANNOT_BRAKE, follower, math.nan)
             return False
         leader = follower

@@ -8,6 +8,7 @@ from coramp.equations.conflict_risk import conflict_severity_m2ps4
 from coramp.equations.safe_distance import merging_speed_along_mps
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.road.rules import Rules
+from coramp.strategies.attempts import tried_of
 from coramp.strategies.base import Decision, Explanation, FollowTrajectory, Memory, View
 from coramp.strategies.rungs import Merge
 from coramp.strategies.situation import (
@@ -18,6 +19,7 @@ from coramp.strategies.situation import (
     gap_size_m,
 )
 from coramp.vehicles.fleet import Fleet, Proposal, committed, trajectory_under
+from coramp.vehicles.trace import LEADER_WAITS, note_choice, note_subject, refuse
 
 Planner = Callable[[Fleet, int, float, float, FloatArray], tuple[MergePlan, Proposal, bool, int]]
 
@@ -52,6 +54,10 @@ def plan_of(
     """Returns the plan that a rung's merge amounts to; ``gap`` is -1 for a hold."""
     order, gap = situation.order, merge.gap
     own_length_m = fleet.length_m[situation.subject]
+    note_subject(proposal.trace, situation.free_accel_mps2, own_length_m, situation.clearance_m)
+    if gap >= 0:
+        front_length_m = fleet.length_m[order[gap - 1]] if gap > 0 else math.nan
+        note_choice(proposal.trace, rung, scenario, front_length_m)
     before = after = (math.nan, math.nan)
     conflict_row = -1
     if conflict >= 0:
@@ -131,7 +137,7 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
     )
     if blocked or plan.rung == RUNG_HOLD:
         again = () if blocked else ((view.time_s + view.rules.control.retry_s, row),)
-        reasons = () if row in waiting else (held(row, plan),)
+        reasons = () if row in waiting else (held(row, plan, proposal),)
         return Decision((), (*rest, *again), waiting | {row}, reasons)
     commands = tuple(
         FollowTrajectory(
@@ -143,17 +149,24 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
         for k in range(int(proposal.size[0]))
     )
     follow_up = ((view.time_s, behind),) if behind in waiting else ()
-    return Decision(commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan),))
+    return Decision(
+        commands, (*rest, *follow_up), waiting - {row}, (explanation(row, plan, proposal),)
+    )
 
 
-def explanation(row: int, plan: MergePlan) -> Explanation:
-    """Returns the record of a plan."""
-    return Explanation(row, RUNGS[plan.rung], *plan[1:])
+def explanation(row: int, plan: MergePlan, proposal: Proposal) -> Explanation:
+    """Returns the record of a plan, with what was tried for it."""
+    return Explanation(row, RUNGS[plan.rung], *plan[1:], tried=tried_of(proposal))
 
 
-def held(row: int, plan: MergePlan) -> Explanation:
-    """Returns the record of a vehicle that keeps its stop, whatever plan there would be for it."""
+def held(row: int, plan: MergePlan, proposal: Proposal) -> Explanation:
+    """Returns the record of a vehicle that keeps its stop, whatever plan there would be for it.
+
+    A plan that there would be is one that has to wait for a vehicle ahead on the ramp.
+    """
     nothing = math.nan
+    if plan.rung != RUNG_HOLD:
+        refuse(proposal.trace, LEADER_WAITS, -1, nothing)
     return explanation(
         row,
         plan._replace(
@@ -171,4 +184,5 @@ def held(row: int, plan: MergePlan) -> Explanation:
             front_station_m=nothing,
             rear_station_m=nothing,
         ),
+        proposal,
     )

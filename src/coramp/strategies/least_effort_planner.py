@@ -11,7 +11,13 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.equations.gap_creation import cascade_shift_m
 from coramp.equations.safe_distance import following_clearance_m
-from coramp.kinematics.trajectory import MAX_PIECES, build, station_and_speed, superpose
+from coramp.kinematics.trajectory import (
+    MAX_PIECES,
+    build,
+    station_and_speed,
+    superpose,
+    time_at_station,
+)
 from coramp.motion.least_effort import constrained_optimum, held_shift, speeds_mps
 from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
@@ -29,6 +35,15 @@ from coramp.strategies.situation import (
     gap_bounds_m,
 )
 from coramp.vehicles.fleet import MAX_CHANGED, Fleet, Proposal, committed, empty_proposal
+from coramp.vehicles.trace import (
+    CANNOT_FALL_BACK,
+    HOLDS_UP_NEWCOMER,
+    NO_EASY_WAY,
+    note_merge,
+    note_moves,
+    open_in_gap,
+    refuse,
+)
 
 MOST_PERIODS = MAX_PIECES - 8
 """Pieces of one trajectory; some are left for what was committed before."""
@@ -55,17 +70,22 @@ class LeastEffort:
         low_m, high_m = gap_bounds_m(fleet, situation, gap)
         target_m = min(high_m, situation.free_m)
         back_m = max(0.0, low_m - target_m)
-        if back_m > 0.0 and (
-            gap == len(situation.order) or target_m < unknown_bound_m(fleet, situation)
-        ):
+        rung, scenario = _rung(situation, target_m, back_m)
+        open_in_gap(proposal.trace, rung, scenario, situation.order, gap)
+        unknown_m = unknown_bound_m(fleet, situation)
+        if back_m > 0.0 and (gap == len(situation.order) or target_m < unknown_m):
+            refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, unknown_m - target_m)
             return None, proposal
         merge_m = min(self.merge_station_m, rules.road.last_merge_station_m)
         merge_s = (merge_m - target_m) / rules.road.mainline_speed_mps
         pieces = self.way_to_merge(fleet, situation, merge_s, merge_m, rules)
         if pieces is None:
+            refuse(proposal.trace, NO_EASY_WAY, -1, math.nan)
             return None, proposal
         _add(proposal, situation.subject, pieces, merge_s)
+        self._note(proposal, pieces, target_m, merge_s, back_m)
         if not self._fall_back(fleet, proposal, situation, gap, back_m, merge_s, rules):
+            refuse(proposal.trace, CANNOT_FALL_BACK, -1, math.nan)
             return None, proposal
         if not delay_followers(fleet, proposal, situation.subject, situation.from_s, rules):
             return None, proposal
@@ -73,8 +93,22 @@ class LeastEffort:
             return None, proposal
         merge = Merge(gap, float(pieces[:, 3].max()), merge_s, merge_m, back_m)
         conflict = conflict_position(fleet, situation, rules)
-        rung, scenario = _rung(situation, target_m, back_m)
         return plan_of(fleet, proposal, situation, merge, rung, scenario, conflict, rules), proposal
+
+    def _note(
+        self,
+        proposal: Proposal,
+        pieces: FloatArray,
+        target_m: float,
+        merge_s: float,
+        back_m: float,
+    ) -> None:
+        nose_s = time_at_station(pieces, 0.0)
+        _, nose_mps = station_and_speed(pieces, nose_s)
+        accel_mps2 = float(pieces[:, 3].max())
+        merge_m = float(pieces[-1, 1])
+        note_merge(proposal.trace, target_m, accel_mps2, merge_s, merge_m, nose_s, nose_mps)
+        note_moves(proposal.trace, 0.0, back_m, float(pieces[0, 0]))
 
     def way_to_merge(
         self, fleet: Fleet, situation: Situation, merge_s: float, merge_m: float, rules: Rules

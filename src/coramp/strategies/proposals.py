@@ -32,6 +32,14 @@ from coramp.vehicles.fleet import (
     proposed,
     trajectory_under,
 )
+from coramp.vehicles.trace import (
+    SHIFT_TOO_FAR,
+    SHIFT_TOO_FAST,
+    SHIFT_TOO_HARD,
+    TOO_MANY_MOVE,
+    refuse,
+    refuse_as_too_near,
+)
 
 
 @kernel
@@ -71,28 +79,35 @@ def propose_shift(
     """
     entry = proposal.size[0]
     if entry >= MAX_CHANGED or entry_of(proposal, row) >= 0:
+        refuse(proposal.trace, TOO_MANY_MOVE, row, math.nan)
         return False
     start_s = max(window_start_s, fleet.merge_time_s[row])
     v0 = rules.road.mainline_speed_mps
     motion = rules.motion
     duration_s = window_end_s - start_s
     deviation = motion.speed_deviation if shift_m >= 0.0 else motion.slow_deviation
-    if abs(shift_m) > largest_shift_m(v0, duration_s, motion.comfort_mps2, deviation):
+    most_m = largest_shift_m(v0, duration_s, motion.comfort_mps2, deviation)
+    if abs(shift_m) > most_m:
+        refuse(proposal.trace, SHIFT_TOO_FAR, row, abs(shift_m) - most_m)
         return False
     before = committed(fleet, row)
     n = superpose_shift(before, from_s, start_s, window_end_s, shift_m, proposal.pieces[entry])
     if n == 0:
+        refuse(proposal.trace, SHIFT_TOO_FAR, row, math.nan)
         return False
     after = proposal.pieces[entry, :n]
     old_lowest, old_highest = speed_range_mps(before, from_s)
     lowest, highest = speed_range_mps(after, from_s)
-    if highest > max(old_highest, (1.0 + motion.speed_deviation) * v0) + ROUNDING_M:
-        return False
-    if lowest < min(old_lowest, (1.0 - motion.slow_deviation) * v0) - ROUNDING_M:
+    if (
+        highest > max(old_highest, (1.0 + motion.speed_deviation) * v0) + ROUNDING_M
+        or lowest < min(old_lowest, (1.0 - motion.slow_deviation) * v0) - ROUNDING_M
+    ):
+        refuse(proposal.trace, SHIFT_TOO_FAST, row, math.nan)
         return False
     if largest_acceleration_mps2(after, from_s) > max(
         motion.comfort_mps2, largest_acceleration_mps2(before, from_s)
     ):
+        refuse(proposal.trace, SHIFT_TOO_HARD, row, math.nan)
         return False
     proposal.rows[entry] = row
     proposal.piece_count[entry] = n
@@ -236,5 +251,8 @@ def find_unsafe_pair(
                 rules,
             )
             if margin_m < rules.safety.execution_allowance_m - ROUNDING_M:
+                missing_m = rules.safety.execution_allowance_m - margin_m
+                moved = -1 if entry == 0 else row
+                refuse_as_too_near(proposal.trace, moved, other_row, missing_m)
                 return row, other_row
     return -1, -1

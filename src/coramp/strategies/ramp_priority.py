@@ -36,6 +36,14 @@ from coramp.strategies.situation import (
 )
 from coramp.strategies.unequal_ladder import plan_unequal_ramp
 from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, proposed
+from coramp.vehicles.trace import (
+    CURRENT,
+    HOLDS_UP_NEWCOMER,
+    MOVES_MORE,
+    give_preference,
+    open_in_gap,
+    refuse,
+)
 
 
 @kernel
@@ -54,15 +62,21 @@ def open_gap(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rule
     The one that adjusts fewest vehicles, then the one with the smallest sum of shifts.
     """
     here = gap_of_free_movement(situation)
-    best, latest = no_merge(), -1
-    if situation.free_m < unknown_bound_m(fleet, situation):
+    best, latest, best_attempt = no_merge(), -1, 0
+    unknown_m = unknown_bound_m(fleet, situation)
+    if situation.free_m < unknown_m:
+        open_in_gap(proposal.trace, RUNG_CREATE, 0, situation.order, here)
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, unknown_m - situation.free_m)
         return best
     fewest, least_m = 0, math.inf
     for gap in (here, here - 1, here + 1):
         if gap < 0 or gap > len(situation.order):
             continue
         movers, shift_m = least_moved(fleet, situation, gap)
+        scenario = scenario_of(fleet, situation, gap)
+        open_in_gap(proposal.trace, RUNG_CREATE, scenario, situation.order, gap)
         if best.gap >= 0 and (movers, shift_m) >= (fewest, least_m):
+            refuse(proposal.trace, MOVES_MORE, -1, math.nan)
             continue
         latest = gap
         merge = merge_at(fleet, proposal, situation, gap, situation.free_m, True, rules)
@@ -71,6 +85,11 @@ def open_gap(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rule
         moved, moved_m = proposal.size[0] - 1, total_shift_m(fleet, proposal, rules)
         if best.gap < 0 or (moved, moved_m) < (fewest, least_m):
             best, fewest, least_m = merge, moved, moved_m
+            best_attempt = give_preference(proposal.trace, best_attempt)
+        else:
+            refuse(proposal.trace, MOVES_MORE, -1, math.nan)
+    if best.gap >= 0:
+        proposal.trace[0, CURRENT] = best_attempt
     if best.gap >= 0 and best.gap != latest:
         return merge_at(fleet, proposal, situation, best.gap, situation.free_m, True, rules)
     return best

@@ -19,6 +19,9 @@ from coramp.strategies.proposals import (
     push_back,
 )
 from coramp.strategies.situation import (
+    RUNG_CREATE,
+    RUNG_FREE,
+    RUNG_REACH,
     Situation,
     gap_bounds_m,
     gap_of_free_movement,
@@ -27,6 +30,18 @@ from coramp.vehicles.fleet import (
     ROUNDING_M,
     Fleet,
     Proposal,
+)
+from coramp.vehicles.trace import (
+    AHEAD_OF_REACH,
+    BEHIND_REACH,
+    FRONT_OUT_OF_REACH,
+    GAP_TOO_SMALL,
+    HOLDS_UP_NEWCOMER,
+    PAST_LAST_STATION,
+    note_merge,
+    note_moves,
+    open_in_gap,
+    refuse,
 )
 
 
@@ -70,13 +85,25 @@ def merge_at(
     merge_s, merge_m = propose_merge(
         proposal, situation.subject, situation.approach, accel_mps2, rules
     )
+    note_merge(
+        proposal.trace,
+        intercept_m,
+        accel_mps2,
+        merge_s,
+        merge_m,
+        situation.nose_s,
+        situation.nose_speed_mps,
+    )
     if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
+        past_m = merge_m - rules.road.last_merge_station_m
+        refuse(proposal.trace, PAST_LAST_STATION, -1, past_m)
         return no_merge()
     ahead_m, back_m = 0.0, 0.0
     if make_room:
         low_m, high_m = gap_bounds_m(fleet, situation, gap)
         ahead_m, back_m = max(0.0, intercept_m - high_m), max(0.0, low_m - intercept_m)
         start_s = situation.nose_s if rules.control.create_from_nose else situation.from_s
+        note_moves(proposal.trace, ahead_m, back_m, start_s)
         if not push_ahead(
             fleet,
             proposal,
@@ -108,9 +135,12 @@ def merge_at(
 @kernel
 def merge_freely(fleet: Fleet, proposal: Proposal, situation: Situation, rules: Rules) -> Merge:
     """Rung free: free movement, if it is safe as it is."""
-    if situation.free_m < unknown_bound_m(fleet, situation):
-        return no_merge()
     gap = gap_of_free_movement(situation)
+    open_in_gap(proposal.trace, RUNG_FREE, 0, situation.order, gap)
+    unknown_m = unknown_bound_m(fleet, situation)
+    if situation.free_m < unknown_m:
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, unknown_m - situation.free_m)
+        return no_merge()
     return merge_at(fleet, proposal, situation, gap, situation.free_m, False, rules)
 
 
@@ -122,16 +152,21 @@ def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rule
     before it on the acceleration lane is in the way, others within the gap are tried.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
     front_m = high_m
     low_m, high_m = max(low_m, situation.lowest_m), min(high_m, situation.highest_m)
     if low_m > high_m:
+        refuse_gap(fleet, proposal, situation, gap)
         return no_merge()
     if rules.control.gap_at_front and not math.isinf(front_m):
         if front_m > high_m + ROUNDING_M:
+            refuse(proposal.trace, FRONT_OUT_OF_REACH, -1, front_m - high_m)
             return no_merge()
         return merge_at(fleet, proposal, situation, gap, front_m, False, rules)
     nearest_m = min(max(situation.free_m, low_m), high_m)
     for share in (0.0, 0.25, 0.5, 1.0):
+        if share > 0.0:
+            open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
         merge = merge_at(
             fleet,
             proposal,
@@ -176,11 +211,38 @@ def create(
         intercept_m = min(max(0.5 * (low_m + high_m), situation.lowest_m), situation.highest_m)
         if not high_m < intercept_m < low_m:  # only one of them would move
             return no_merge()
-    if intercept_m < situation.lowest_m or intercept_m > situation.highest_m:
+    open_in_gap(proposal.trace, RUNG_CREATE, scenario, situation.order, gap)
+    unknown_m = unknown_bound_m(fleet, situation)
+    if intercept_m < situation.lowest_m:
+        refuse(proposal.trace, BEHIND_REACH, -1, situation.lowest_m - intercept_m)
         return no_merge()
-    if intercept_m < unknown_bound_m(fleet, situation):
+    if intercept_m > situation.highest_m:
+        refuse(proposal.trace, AHEAD_OF_REACH, -1, intercept_m - situation.highest_m)
+        return no_merge()
+    if intercept_m < unknown_m:
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, unknown_m - intercept_m)
         return no_merge()
     return merge_at(fleet, proposal, situation, gap, intercept_m, True, rules)
+
+
+@kernel
+def refuse_gap(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int) -> None:
+    """Says why a gap that the subject cannot reach as it is does not help, in the trace.
+
+    It is too small, or large enough and out of reach; or what is left of it, or within reach, could
+    hold up a vehicle that is yet to enter.
+    """
+    low_m, high_m = gap_bounds_m(fleet, situation, gap)
+    rear_known = gap < len(situation.order) and situation.intercepts_m[gap] >= situation.known_m
+    if low_m > min(high_m, situation.highest_m) and not rear_known:
+        missing_m = low_m - min(high_m, situation.highest_m)
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, missing_m)
+    elif low_m > high_m:
+        refuse(proposal.trace, GAP_TOO_SMALL, -1, low_m - high_m)
+    elif low_m > situation.highest_m:
+        refuse(proposal.trace, AHEAD_OF_REACH, -1, low_m - situation.highest_m)
+    else:
+        refuse(proposal.trace, BEHIND_REACH, -1, situation.lowest_m - high_m)
 
 
 @kernel

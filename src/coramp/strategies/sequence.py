@@ -14,6 +14,7 @@ from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.road.rules import Rules, unpacked
+from coramp.strategies.attempts import joined
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_late
 from coramp.strategies.feedback import place_on_mainline
@@ -116,17 +117,28 @@ def decide_in_sequence(
         seen = crossings(fleet, row, situation.from_s, rules)
         chosen, count = sequencer(seen), len(seen.mainline_s) + 1
         gaps = np.arange(chosen, count) if later_only else gaps_around(chosen, count)
+        earlier: list[FloatArray] = []
         for place in range(min(len(gaps), MOST_GAPS)):
             plan, proposal = least_effort.plan(fleet, situation, int(gaps[place]), rules)
             if plan is not None:
-                return plan, proposal, *ramp_neighbours(fleet, row, situation.from_s)
+                told = with_earlier(proposal, earlier)
+                return plan, told, *ramp_neighbours(fleet, row, situation.from_s)
+            earlier.append(proposal.trace)
             one = gaps[place : place + 1]
             answer = plan_in_gaps(fleet, row, now_s, fastest_entry_mps, one, packed_rules)
             if answer[0].rung != RUNG_HOLD:
-                return answer
-        return plan_in_gaps(fleet, row, now_s, fastest_entry_mps, gaps[:0], packed_rules)
+                return answer[0], with_earlier(answer[1], earlier), *answer[2:]
+            earlier.append(answer[1].trace)
+        none = gaps[:0]
+        answer = plan_in_gaps(fleet, row, now_s, fastest_entry_mps, none, packed_rules)
+        return answer[0], with_earlier(answer[1], earlier), *answer[2:]
 
     return decide_first(planner, view, memory)
+
+
+def with_earlier(proposal: Proposal, earlier: list[FloatArray]) -> Proposal:
+    """Returns the proposal with what was tried before it, in other gaps."""
+    return proposal._replace(trace=joined(earlier, proposal.trace))
 
 
 def gaps_around(chosen: int, count: int) -> IntArray:

@@ -42,6 +42,21 @@ from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
 from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
 from coramp.strategies.slot_pushing import fall_back_behind
 from coramp.vehicles.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
+from coramp.vehicles.trace import (
+    AHEAD_OF_REACH,
+    CANNOT_FALL_BACK,
+    GAP_TOO_SMALL,
+    LEADER_WAITS,
+    NO_LATE_WAY,
+    PAST_LAST_STATION,
+    TOO_LATE,
+    accept,
+    note_merge,
+    note_moves,
+    open_attempt,
+    open_in_gap,
+    refuse,
+)
 
 ROOM = 128
 """Vehicles that a plan may change: the subject and those behind it."""
@@ -116,7 +131,10 @@ def plan_onto_lane(
     blocked, behind = ramp_neighbours(fleet, row, situation.from_s)
     conflict = conflict_position(fleet, situation, rules)
     merge = no_merge()
-    if not blocked:
+    if blocked:
+        open_attempt(proposal.trace, RUNG_DELAY, 0, -1, -1)
+        refuse(proposal.trace, LEADER_WAITS, -1, math.nan)
+    else:
         claim_m = -rules.road.mainline_speed_mps * claim_s
         earliest_m = earliest_slot_m(fleet, situation, claim_m, rules)
         wish = Wish(earliest_m, claim_m, pushes, jerk_mps3)
@@ -124,7 +142,9 @@ def plan_onto_lane(
             merge = slot_among(fleet, proposal, situation, wish, rules)
         if merge.gap < 0:
             merge = first_slot(fleet, proposal, situation, wish, rules)
-            if pushes and merge.largest_shift_m > rules.road.mainline_speed_mps * PATIENCE_S:
+            patience_m = rules.road.mainline_speed_mps * PATIENCE_S
+            if pushes and merge.largest_shift_m > patience_m:
+                refuse(proposal.trace, TOO_LATE, -1, merge.largest_shift_m - patience_m)
                 proposal.size[0] = 0
                 merge = no_merge()
     rung = RUNG_HOLD
@@ -166,9 +186,14 @@ def first_slot(
             order, intercepts_m, fleet.length_m, gap, -math.inf, own_m, situation.clearance_m
         )
         first_m, failed_m = min(high_m, wish.earliest_m), -1.0
+        if first_m < low_m:
+            open_in_gap(proposal.trace, RUNG_DELAY, 0, order, gap)
+            reason = GAP_TOO_SMALL if high_m < low_m else AHEAD_OF_REACH
+            refuse(proposal.trace, reason, -1, low_m - first_m)
         for setback_m in SETBACKS_M:
             if first_m - setback_m < low_m:
                 break
+            open_in_gap(proposal.trace, RUNG_DELAY, 0, order, gap)
             place = Place(gap, first_m - setback_m, len(order), wish.jerk_mps3)
             merge = merge_in_slot(fleet, proposal, situation, place, rules)
             if merge.gap >= 0:
@@ -216,6 +241,7 @@ def slot_among(
         ahead_m = intercepts_m[gap - 1] - fleet.length_m[order[gap - 1]] - situation.clearance_m
         first_m = min(first_m, ahead_m)
     for setback_m in PUSHING_SETBACKS_M:
+        open_in_gap(proposal.trace, RUNG_DELAY, 0, order, gap)
         place = Place(gap, first_m - setback_m, gap, wish.jerk_mps3)
         merge = merge_in_slot(fleet, proposal, situation, place, rules)
         if merge.gap >= 0:
@@ -236,6 +262,7 @@ def merge_in_slot(
     road, motion = rules.road, rules.motion
     free, most = situation.free_accel_mps2, motion.ramp_acceleration_mps2
     behind_free_m = situation.free_m - place.slot_m
+    refuse(proposal.trace, NO_LATE_WAY, -1, math.nan)
     way = np.empty((MAX_PIECES, 4))
     if abs(behind_free_m) < KEEP_M and merges_safely(
         fleet, proposal, situation, situation.approach, free, place, rules
@@ -279,8 +306,9 @@ def merge_in_slot(
 def merge_of(proposal: Proposal, gap: int, accel_mps2: float, behind_free_m: float) -> Merge:
     """Returns the merge that the proposal's first entry makes."""
     pieces = proposed(proposal, 0)
-    merge_m = pieces[len(pieces) - 1, STATION]
-    return Merge(gap, accel_mps2, proposal.merge_time_s[0], merge_m, behind_free_m)
+    merge_s, merge_m = proposal.merge_time_s[0], pieces[len(pieces) - 1, STATION]
+    accept(proposal.trace)
+    return Merge(gap, accel_mps2, merge_s, merge_m, behind_free_m)
 
 
 @kernel
@@ -297,12 +325,18 @@ def merges_safely(
 
     Those behind on the ramp brake for their stops, those behind on the mainline fall back.
     """
-    _, merge_m = propose_merge(proposal, situation.subject, approach, accel_mps2, rules)
+    merge_s, merge_m = propose_merge(proposal, situation.subject, approach, accel_mps2, rules)
+    nose = approach[len(approach) - 1]
+    note_merge(proposal.trace, place.slot_m, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED])
+    note_moves(proposal.trace, 0.0, 0.0, situation.from_s)
     if merge_m > rules.road.last_merge_station_m + ROUNDING_M:
+        past_m = merge_m - rules.road.last_merge_station_m
+        refuse(proposal.trace, PAST_LAST_STATION, -1, past_m)
         return False
     if not delay_followers(fleet, proposal, situation.subject, situation.from_s, rules):
         return False
     if not fall_back_behind(fleet, proposal, situation, place.first_behind, place.slot_m, rules):
+        refuse(proposal.trace, CANNOT_FALL_BACK, -1, math.nan)
         return False
     unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
     return bool(unsafe < 0)

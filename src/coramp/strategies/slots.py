@@ -130,7 +130,7 @@ class Slots:
             view.packed_rules,
         )
         if plan.rung == RUNG_HOLD:
-            story = () if claim.waits else (held(row, plan),)
+            story = () if claim.waits else (held(row, plan, proposal),)
             return Decision((), again, waiting, story)
         commands = tuple(
             FollowTrajectory(
@@ -143,7 +143,7 @@ class Slots:
         )
         left = claims[1:]
         follow_up = tuple((view.time_s, next_one.row) for next_one in left[:1] if next_one.waits)
-        return Decision(commands, follow_up, left, (explanation(row, plan),))
+        return Decision(commands, follow_up, left, (explanation(row, plan, proposal),))
 
     @property
     def _most_jerk(self) -> float:

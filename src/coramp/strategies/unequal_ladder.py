@@ -37,6 +37,16 @@ from coramp.strategies.unequal_merge import (
     try_merge,
 )
 from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, trajectory_under
+from coramp.vehicles.trace import (
+    CURRENT,
+    MOVES_MORE,
+    NO_LATE_WAY,
+    give_preference,
+    note_choice,
+    note_subject,
+    open_attempt,
+    refuse,
+)
 from coramp.vehicles.traits import LENGTH, MASS, able_mps2, cruise_mps, own_rules, pair_safety
 
 ACCELERATIONS = 7
@@ -108,6 +118,7 @@ def _accelerations(
 @kernel
 def rung_free(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules) -> UnequalMerge:
     """Free movement, if nobody has to move."""
+    open_attempt(proposal.trace, RUNG_FREE, 0, -1, -1)
     return try_merge(
         fleet,
         proposal,
@@ -124,6 +135,7 @@ def rung_free(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules) 
 def rung_reach(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules) -> UnequalMerge:
     """The acceleration nearest to that of free movement with which nobody has to move."""
     for accel_mps2 in subject.tried_mps2:
+        open_attempt(proposal.trace, RUNG_REACH, 0, -1, -1)
         merge = try_merge(
             fleet,
             proposal,
@@ -147,10 +159,11 @@ def rung_create(
 
     With ``free_alone`` the subject keeps its free movement.
     """
-    best = no_unequal_merge()
+    best, best_attempt = no_unequal_merge(), 0
     latest_mps2 = math.nan
     for k in range(-1, 0 if free_alone else ACCELERATIONS):
         accel_mps2 = subject.free_mps2 if k < 0 else subject.tried_mps2[k]
+        open_attempt(proposal.trace, RUNG_CREATE, 2, -1, -1)
         merge = try_merge(
             fleet,
             proposal,
@@ -166,6 +179,11 @@ def rung_create(
             not best.done or (merge.moved, merge.lost_s) < (best.moved, best.lost_s)
         ):
             best = merge
+            best_attempt = give_preference(proposal.trace, best_attempt)
+        elif merge.done:
+            refuse(proposal.trace, MOVES_MORE, -1, math.nan)
+    if best.done:
+        proposal.trace[0, CURRENT] = best_attempt
     if best.done and best.accel_mps2 != latest_mps2:
         return try_merge(
             fleet,
@@ -209,6 +227,7 @@ def come_later_by(
     nose_s = subject.approach[len(subject.approach) - 1, TIME] + later_s
     out = np.empty((MAX_PIECES, 4))
     for way in range(3):
+        open_attempt(proposal.trace, RUNG_DELAY, 2 if make_room else 0, -1, -1)
         if way == 0:
             n = brake_and_go(from_s, station_m, speed_mps, nose_s, own.road, own.motion, out)
         elif way == 1:
@@ -221,6 +240,7 @@ def come_later_by(
                 if wait_s > 0.0:
                     n = late_start(before, from_s, wait_s, own.road, own.motion, out)
         if n == 0:
+            refuse(proposal.trace, NO_LATE_WAY, -1, math.nan)
             continue
         merge = try_merge(
             fleet,
@@ -252,6 +272,7 @@ def unequal_plan(
     and the subject before and after they adapt.
     """
     nothing, row = math.nan, subject.row
+    note_subject(proposal.trace, subject.free_mps2, fleet.traits[row, LENGTH], nothing)
     nose = subject.approach[len(subject.approach) - 1]
     if not merge.done:
         return MergePlan(
@@ -297,6 +318,8 @@ def unequal_plan(
             conflict, nearest_m = other, distance_m
     if merge.front_row >= 0 and merge.rear_row >= 0:
         gap_m = front_m - rear_m
+    front_length_m = fleet.traits[merge.front_row, LENGTH] if merge.front_row >= 0 else nothing
+    note_choice(proposal.trace, rung, 2 if merge.moved > 0 else 0, front_length_m)
     before = after = (nothing, nothing)
     if conflict >= 0:
         before = _severity(fleet, row, committed(fleet, conflict), conflict, merge, rules)

@@ -34,6 +34,18 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     proposed,
 )
+from coramp.vehicles.trace import (
+    BEFORE_THE_NOSE,
+    CANNOT_FALL_BACK,
+    CANNOT_FOLLOW,
+    HOLDS_UP_NEWCOMER,
+    NO_EASY_WAY,
+    TOO_MANY_MOVE,
+    note_gap,
+    note_merge,
+    refuse,
+    refuse_as_too_near,
+)
 from coramp.vehicles.traits import LENGTH, cruise_mps, pair_safety
 
 MOST_AIMS = 3
@@ -132,15 +144,25 @@ def try_merge(
     base = np.empty((MAX_PIECES, 4))
     m, merge_s, order, place = way_to_merge(fleet, subject, approach, accel_mps2, rules, base)
     if m == 0:
+        refuse(proposal.trace, NO_EASY_WAY, -1, math.nan)
         return no_unequal_merge()
     merge_m, merge_mps = station_and_speed(base[:m], merge_s)
+    nose = approach[len(approach) - 1]
+    note_merge(proposal.trace, math.nan, accel_mps2, merge_s, merge_m, nose[TIME], nose[SPEED])
+    front = order[place - 1] if place > 0 else -1
+    rear = order[place] if place < len(order) else -1
+    note_gap(proposal.trace, front, rear)
     room_m = merge_clearance_m(rules.road, pair_safety(traits, traits, rules.safety))
     rear_m = merge_m - traits[LENGTH] - room_m
-    if merge_m <= 0.0 or rear_m - rules.road.mainline_speed_mps * merge_s < known_m:
+    if merge_m <= 0.0:
+        refuse(proposal.trace, BEFORE_THE_NOSE, -1, -merge_m)
+        return no_unequal_merge()
+    held_up_m = known_m - (rear_m - rules.road.mainline_speed_mps * merge_s)
+    if held_up_m > 0.0:
+        refuse(proposal.trace, HOLDS_UP_NEWCOMER, -1, held_up_m)
         return no_unequal_merge()
     count = m
     proposal.pieces[0, :m] = base[:m]
-    front = order[place - 1] if place > 0 else -1
     if front >= 0:
         count = follow_safely(
             base[:m],
@@ -155,6 +177,7 @@ def try_merge(
             proposal.pieces[0],
         )
         if count == 0:
+            refuse(proposal.trace, CANNOT_FOLLOW, front, math.nan)
             return no_unequal_merge()
     proposal.size[0], proposal.rows[0] = 1, subject
     proposal.piece_count[0], proposal.merge_time_s[0] = count, merge_s
@@ -165,7 +188,6 @@ def try_merge(
     unsafe, _ = find_unsafe_pair(fleet, proposal, from_s, rules)
     if unsafe >= 0:
         return no_unequal_merge()
-    rear = order[place] if place < len(order) else -1
     return UnequalMerge(True, accel_mps2, merge_s, merge_m, merge_mps, front, rear, moved, lost_s)
 
 
@@ -240,7 +262,12 @@ def give_way(
         )
         if margin_m >= rules.safety.execution_allowance_m - ROUNDING_M:
             return lost_s
-        if not make_room or is_full(proposal):
+        if not make_room:
+            missing_m = rules.safety.execution_allowance_m - margin_m
+            refuse_as_too_near(proposal.trace, -1, row, missing_m)
+            return math.inf
+        if is_full(proposal):
+            refuse(proposal.trace, TOO_MANY_MOVE, row, math.nan)
             return math.inf
         out = proposal.pieces[entry + 1]
         count = follow_safely(
@@ -256,6 +283,7 @@ def give_way(
             out,
         )
         if count == 0:
+            refuse(proposal.trace, CANNOT_FALL_BACK, row, math.nan)
             return math.inf
         proposal.rows[entry + 1], proposal.piece_count[entry + 1] = row, count
         proposal.merge_time_s[entry + 1] = fleet.merge_time_s[row]

@@ -10,6 +10,7 @@ from coramp.equations.safe_distance import merge_distance_m, merging_speed_along
 from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
 from coramp.road.rules import Road, Rules, SafetyBudget
 from coramp.vehicles.separation import smallest_margin_m
+from coramp.vehicles.trace import empty_trace
 from coramp.vehicles.traits import LENGTH, pair_safety
 
 
@@ -37,6 +38,7 @@ class Proposal(NamedTuple):
     """New trajectories for some rows; ``size[0]`` of the entries are in use.
 
     The pieces start where the new trajectory takes over; what lies before stays as committed.
+    ``trace`` says what was tried for it (``vehicles.trace``).
     """
 
     size: IntArray
@@ -44,6 +46,7 @@ class Proposal(NamedTuple):
     piece_count: IntArray
     pieces: FloatArray
     merge_time_s: FloatArray
+    trace: FloatArray
 
 
 ROUNDING_M = 1e-10
@@ -61,6 +64,7 @@ def empty_proposal(room: int = MAX_CHANGED) -> Proposal:
         np.empty(room, np.int64),
         np.empty((room, MAX_PIECES, 4)),
         np.empty(room),
+        empty_trace(),
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import polars as pl
 
-from coramp.explain.story import quantities_in, told
+from coramp.explain.story import quantities_in, told, tried_in
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.style import look_of
@@ -143,6 +143,7 @@ def _decision(
         "merge_time": _finite(row["merge_time_s"]),
         "merge_station": _finite(row["merge_station_m"]),
         "required_gap": _finite(row["required_gap_m"]),
+        "tried": tried_in(run, row),
         "quantities": found,
     }
 

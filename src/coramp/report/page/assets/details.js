@@ -44,6 +44,15 @@ coramp.mainDecision = (run, i) => {
   return own.findLast((d) => d.rung !== 'hold') ?? own.at(-1) ?? run.movedFor.get(i)?.at(-1) ?? null;
 };
 
+// What was tried for a decision, line by line, from the records of the run.
+coramp.triedOf = (run, decision) => {
+  const { element } = coramp;
+  const who = `${run.ids[decision.vehicle]} at ${decision.time.toFixed(1)} s`;
+  return element('details', { class: 'tried' },
+    element('summary', {}, `What was tried for ${who}, and why it was refused`),
+    element('ul', {}, ...decision.tried.map((line) => element('li', {}, line))));
+};
+
 coramp.detailsOf = (run, i) => {
   const { element } = coramp;
   const box = element('div', { class: 'details' });
@@ -54,6 +63,7 @@ coramp.detailsOf = (run, i) => {
   box.append(list);
   const decision = coramp.mainDecision(run, i);
   if (decision === null) return box;
+  box.append(coramp.triedOf(run, decision));
   const who = run.ids[decision.vehicle];
   const caption = `Decision for ${who} at ${decision.time.toFixed(1)} s, rung ${decision.rung}: `
     + 'every quantity behind it, with its equation in the paper';
