@@ -14,7 +14,11 @@ from coramp.records.files import made_folder
 from coramp.records.run_folder import SUMO, not_replaceable, write_run
 from coramp.records.staging import staged_folder
 from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
-from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
+from coramp.runs.expected_queue import (
+    demand_above_limit,
+    demands_above_limit,
+    seeds_without_effect,
+)
 from coramp.runs.planning import PlannedSnapshot, plan_snapshot
 from coramp.runs.running import RunSpec, broken_promises, engine_checked, make_spec, recorded
 from coramp.scenarios.snapshots import load_snapshot
@@ -177,6 +181,8 @@ def run(
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
+    if notice is not None and seed != 1 and not spec.seed_matters:
+        notice(f"arrivals are listed: with {strategy} seed {seed} changes nothing")
     if out is None:
         return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages), notice)
     with staged_folder(Path(out), not_replaceable) as stage:
@@ -221,6 +227,8 @@ def study(
     specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
     if notice is not None and (line := demands_above_limit(specs)) is not None:
+        notice(line)
+    if notice is not None and seeds > 1 and (line := seeds_without_effect(specs)) is not None:
         notice(line)
     with connected(cluster) if cluster is not None else nullcontext():
         store = Store(_folder_of(definition, out), definition)

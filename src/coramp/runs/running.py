@@ -83,6 +83,11 @@ class RunSpec:
         }
 
     @property
+    def seed_matters(self) -> bool:
+        """Whether another seed is another run: not where all is listed and nobody is a driver."""
+        return self.drivers is not None or not self.scenario.arrivals
+
+    @property
     def settings(self) -> str | None:
         """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
         return json.dumps(dict(self.overrides), default=str) if self.overrides else None

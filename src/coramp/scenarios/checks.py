@@ -87,6 +87,8 @@ def _place_problems(scenario: "Scenario") -> list[str]:
 
 
 def _flow_problems(scenario: "Scenario") -> list[str]:
+    if scenario.arrivals:
+        return _list_problems(scenario)
     problems = []
     for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
         most = 3600.0 / stream.min_headway_s
@@ -97,7 +99,21 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
             for key, flow in flows
             if flow is not None and flow >= most
         ]
+    return problems
+
+
+def _list_problems(scenario: "Scenario") -> list[str]:
+    problems = []
     last_s: dict[str, float] = {}
+    late = [k for k, a in enumerate(scenario.arrivals) if a.time_s > scenario.simulation.horizon_s]
+    if late:
+        first_s = scenario.arrivals[late[0]].time_s
+        least_s = math.ceil(max(a.time_s for a in scenario.arrivals))
+        problems.append(
+            f"simulation.horizon_s: {scenario.simulation.horizon_s:g} is too short for the list: "
+            f"{len(late)} of {len(scenario.arrivals)} arrivals lie beyond it, the first "
+            f"arrivals.{late[0]} at {first_s:g} s; allowed is at least {least_s} s"
+        )
     for number, arrival in enumerate(scenario.arrivals):
         key = f"arrivals.{number}"
         limit = getattr(scenario, arrival.stream).limit_mps
@@ -110,11 +126,6 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
             problems.append(
                 f"{key}.time_s: {arrival.time_s:g} does not come after the one before it on the "
                 f"{arrival.stream}; allowed is above {last_s[arrival.stream]:g} s"
-            )
-        if arrival.time_s > scenario.simulation.horizon_s:
-            problems.append(
-                f"{key}.time_s: {arrival.time_s:g} lies beyond simulation.horizon_s; "
-                f"allowed is up to {scenario.simulation.horizon_s:g} s"
             )
         if not is_multiple(arrival.time_s, scenario.control.step_s):
             problems.append(

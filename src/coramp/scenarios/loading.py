@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from coramp.errors import CorampError
+from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
 
@@ -21,7 +22,8 @@ def load_scenario(
     label, data = read("scenarios", name)
     overrides = overrides or {}
     blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
-    return validated(Scenario, with_overrides(data, overrides, blamed), label, blamed)
+    data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
+    return validated(Scenario, with_listed_flows(data, label, blamed), label, blamed)
 
 
 def builtin_scenarios() -> list[Scenario]:

@@ -72,6 +72,14 @@ def read(kind: str, name: str) -> tuple[str, Data]:
     return label, data
 
 
+def beside(name: str, scenario: str) -> str:
+    """Returns the scenario that a file names, as ``read`` takes it from anywhere.
+
+    A built-in one keeps its name; the path of a file counts from the folder of the file ``name``.
+    """
+    return scenario if scenario in builtin_names("scenarios") else str(Path(name).parent / scenario)
+
+
 def _parsed(text: str, label: str) -> Data:
     """Returns the content of a TOML text; errors begin with the label."""
     if (key := long_key_in(text)) is not None:

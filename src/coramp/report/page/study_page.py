@@ -23,6 +23,7 @@ from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import checked_study
 from coramp.report.style import look_of
+from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.shown import (
     SHOWN_DRIVERS,
@@ -71,18 +72,29 @@ def study_page(folder: Path) -> str:
         "study.html",
         title=f"Report: study {study.name}",
         subtitle=study.description,
-        asked=_asked(study, good),
+        asked=_asked(study, good, listed=_lists_arrivals(content)),
         answer=_answer(good),
-        notes=[*_notes(study, runs), *said],
+        notes=[*_notes(study, runs, listed=_lists_arrivals(content)), *said],
         tables=summary_tables(study, runs),
         pictures=pictures_of(study.layout, good),
         failed=_failed(runs),
-        sure=_how_sure(good),
+        sure=_how_sure(good, listed=_lists_arrivals(content)),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
-        repeat=f"coramp study {study.name} --seeds {good['seed'].n_unique()}",
+        repeat=f"coramp study {_file_of(study)} --seeds {good['seed'].n_unique()}",
         runs=packs,
         cells=cells,
     )
+
+
+def _file_of(study: Study) -> str:
+    """The study as the command takes it; one of one's own is taken to lie in NAME.toml."""
+    return study.name if study.name in builtin_names("studies") else f"{study.name}.toml"
+
+
+def _lists_arrivals(content: Row) -> bool:
+    """Whether the study's scenario lists its arrivals."""
+    scenario = content.get("scenario")
+    return isinstance(scenario, dict) and bool(scenario.get("arrivals"))
 
 
 def _content(folder: Path) -> Row:
@@ -108,7 +120,7 @@ def _runs(folder: Path, study: Study) -> pl.DataFrame:
         raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
 
 
-def _asked(study: Study, good: pl.DataFrame) -> Table:
+def _asked(study: Study, good: pl.DataFrame, *, listed: bool) -> Table:
     flows = good.select("mainline_veh_h", "ramp_veh_h").unique().sort(pl.all())
     pairs = [f"{mainline:g} + {ramp:g}" for mainline, ramp in flows.iter_rows()]
     shown = ", ".join(pairs) if len(pairs) <= 12 else f"{pairs[0]} to {pairs[-1]} ({len(pairs)})"
@@ -116,7 +128,7 @@ def _asked(study: Study, good: pl.DataFrame) -> Table:
         ("study", f"{study.name}: {study.description}".rstrip(": ")),
         ("scenario", study.scenario),
         ("strategies", ", ".join(good["strategy"].unique(maintain_order=True))),
-        ("flows, mainline + ramp (veh/h)", shown),
+        ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
     )
@@ -154,9 +166,12 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _notes(study: Study, runs: pl.DataFrame) -> Iterator[str]:
+def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     seeds = int(runs["seed"].max())  # type: ignore[arg-type]
     asked = count_runs(study, seeds)
+    if listed:  # no seed changes what nobody drives, so each runs once
+        once = runs.filter(pl.col("drivers").is_null()).height
+        asked -= once * (seeds - 1)
     if runs.height < asked:
         most = "at most " if study.searches else ""
         yield f"{runs.height} of {most}{asked} runs with {seeds} seeds are done and reported here."
@@ -180,15 +195,22 @@ def _cell(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _how_sure(good: pl.DataFrame) -> list[str]:
+def _how_sure(good: pl.DataFrame, *, listed: bool) -> list[str]:
     kept = promises(good)
     seeds = good["seed"].n_unique()
     alone = " One seed has none; run more (--seeds 10)." if seeds == 1 else ""
-    return [
-        (
+    if listed:
+        means = (
+            "Arrivals are listed: a seed changes drivers alone, and a cooperative run is the same "
+            "with every seed. It runs once, so that it has no interval."
+        )
+    else:
+        means = (
             f"Means are over {seeds} seeds, each one draw of arrivals and entry speeds, the same "
             f"for every strategy; ± is a 95 % interval of the mean by Student's t.{alone}"
-        ),
+        )
+    return [
+        means,
         "What the cooperative runs promised: "
         + "; ".join(f"{what}: {value}" for what, value in kept.rows)
         + ".",
