@@ -204,12 +204,8 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
         need_m = least * usable_m / motion.ramp_acceleration_mps2 + lane_m - usable_m
         asked = f"Eq. 22 asks for {least:.2f} m/s2, more than motion.ramp_acceleration_mps2"
         return [f"{key}: {lane_m:g} is too short: {asked}; allowed is above {need_m:.1f} m"]
-    problems = []
-    if not least <= motion.free_acceleration_mps2 <= motion.ramp_acceleration_mps2:
-        problems.append(
-            f"motion.free_acceleration_mps2: {motion.free_acceleration_mps2:g} is outside Eq. 22; "
-            f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
-        )
+    found = _free_acceleration_problem(scenario, least)
+    problems = [found] if found else []
     first, last = decision_station_range_m(scenario)
     if gaps := _gap_problems(scenario, first, last):
         problems += gaps
@@ -226,6 +222,33 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
             f"allowed is {first:.1f} to {last:.1f} m"
         )
     return problems
+
+
+def _free_acceleration_problem(scenario: "Scenario", least_mps2: float) -> str:
+    """What is wrong where the ordinary acceleration does not fit the lane, else nothing.
+
+    Blamed is the acceleration where it was given, else the lane.
+    """
+    motion, ramp, v0 = scenario.motion, scenario.ramp, scenario.mainline.speed_mps
+    free_mps2, most_mps2 = motion.free_acceleration_mps2, motion.ramp_acceleration_mps2
+    key = "motion.free_acceleration_mps2"
+    allowed = f"{math.ceil(1000.0 * least_mps2) / 1000.0:g} to {most_mps2:g} m/s2"
+    if free_mps2 > most_mps2:
+        return f"{key}: {free_mps2:g} is above motion.ramp_acceleration_mps2; allowed is {allowed}"
+    if free_mps2 >= least_mps2:
+        return ""
+    usable_m, lane_m = scenario.last_merge_station_m, ramp.acceleration_lane_m
+    need_m = least_mps2 * usable_m / free_mps2 + lane_m - usable_m
+    way = f"from {ramp.speed_mps:g} to {v0:g} m/s"
+    if "free_acceleration_mps2" in motion.model_fields_set:
+        return (
+            f"{key}: {free_mps2:g} does not get a vehicle {way} within ramp.acceleration_lane_m "
+            f"{lane_m:g} (Eq. 22); allowed is {allowed}, or a lane above {need_m:.1f} m"
+        )
+    return (
+        f"ramp.acceleration_lane_m: {lane_m:g} is too short to get {way} with {key} {free_mps2:g}; "
+        f"allowed is above {need_m:.1f} m, or {key} of {allowed} (Eq. 22)"
+    )
 
 
 def _gap_problems(scenario: "Scenario", first_m: float, last_m: float) -> list[str]:
