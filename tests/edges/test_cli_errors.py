@@ -275,7 +275,7 @@ class TestFiles:
         Path("x.toml").write_text('[tool]\nkind = "other"\n')
         lines = refused(here, command, "x.toml", *self.out(command))
         assert any(line.startswith("Error: x.toml: tool: unknown key; ") for line in lines)
-        assert any("name: is missing" in line for line in lines)
+        assert any("is missing" in line for line in lines)
 
     @staticmethod
     def out(command):
@@ -287,10 +287,7 @@ class TestFiles:
     [
         (
             {"limit_mps = 20.0": "limt_mps = 20.0"},
-            [
-                "mainline.limit_mps: is missing; it must be given",
-                "mainline.limt_mps: unknown key; ",
-            ],
+            ["mainline.limt_mps: unknown key; did you mean limit_mps?"],
         ),
         (
             {"[mainline]": "[mainlin]"},

@@ -54,20 +54,25 @@ def _options(
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
 
-@app.command(epilog="Example: coramp scenarios paper > my-ramp.toml")
+@app.command(
+    epilog="Examples: coramp scenarios paper > my-ramp.toml; coramp scenarios my-ramp.toml"
+)
 def scenarios(
     name: Annotated[
-        str | None, typer.Argument(help="Print this one's TOML, to start your own from.")
+        str | None,
+        typer.Argument(
+            help="Print this built-in one's TOML, to start your own from, or a file of yours with "
+            "all that is chosen for it."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """List the built-in scenarios, snapshots and studies, or print one of them."""
+    """List the built-in scenarios, snapshots and studies, or print one of them or of yours."""
     from coramp.cli.console import print_json, print_listing
-    from coramp.cli.listing import listing
-    from coramp.scenarios.toml_files import builtin_text
+    from coramp.cli.listing import listing, printed
 
     if name is not None:
-        print(builtin_text(name), end="")
+        print(printed(name), end="")
         return
     found = listing()
     if json:

@@ -73,9 +73,10 @@ def _place_problems(scenario: "Scenario") -> list[str]:
             f"ramp.detector_station_m: {scenario.detector_station_m:g} is not beside the "
             f"acceleration lane; allowed is up to {ramp.acceleration_lane_m:g} m"
         )
-    if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
+    given_m = ramp.decision_station_m
+    if given_m is not None and not ramp.start_m < given_m < scenario.stop_station_m:
         problems.append(
-            f"ramp.decision_station_m: {ramp.decision_station_m:g} is not on the ramp before the "
+            f"ramp.decision_station_m: {given_m:g} is not on the ramp before the "
             f"stop; allowed is between {ramp.start_m:g} and {scenario.stop_station_m:g} m"
         )
     if scenario.stop_station_m > -scenario.run_up_m:
@@ -215,9 +216,9 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
             f"({first:.1f} m or later) and it can still stop ({last:.1f} m or earlier); "
             "allowed are an earlier mainline.start_m, a shorter acceleration lane, harder braking"
         )
-    elif not first <= ramp.decision_station_m <= last:
+    elif not first <= scenario.decision_station_m <= last:
         problems.append(
-            f"ramp.decision_station_m: at {ramp.decision_station_m:g} m not every vehicle that "
+            f"ramp.decision_station_m: at {scenario.decision_station_m:g} m not every vehicle that "
             "matters has entered, or it is too late to stop; "
             f"allowed is {first:.1f} to {last:.1f} m"
         )
@@ -290,9 +291,9 @@ def decision_station_range_m(scenario: "Scenario") -> tuple[float, float]:
     The first: a mainline vehicle that enters just then must come behind the subject even if this
     merges with the least acceleration. The last: from there it can still stop before the nose.
     """
-    road, safety = scenario.rules().road, scenario.rules().safety
+    rules = scenario.rules_with(math.nan)  # of the station itself nothing here depends
+    road, safety, control = rules.road, rules.safety, scenario.control
     v0, ramp_mps = road.mainline_speed_mps, road.ramp_speed_mps
-    control = scenario.control
     least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
     behind_m = (
         lag_m(v0, ramp_mps, least)
