@@ -25,6 +25,17 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "drivers": drivers_tables,
     "worth": worth_tables,
 }
+IMPORTANT = (
+    "scenario",
+    "strategy",
+    "flow (veh/h)",
+    "delay of all (s)",
+    "mainline delay (s)",
+    "ramp delay (s)",
+    "unserved",
+    "runs",
+)
+"""Columns of the overview that a narrow terminal keeps first."""
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
 
@@ -81,7 +92,7 @@ def overview(good: pl.DataFrame) -> Table:
         "hardest braking (m/s2)",
     )
     note = "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle."
-    return Table("All runs", columns, tuple(rows), (note,))
+    return Table("All runs", columns, tuple(rows), (note,), IMPORTANT)
 
 
 def promises(runs: pl.DataFrame) -> Table:
