@@ -152,6 +152,18 @@ def make_spec(
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
 
 
+def stored_spec(content: Row, scenario: Scenario) -> RunSpec:
+    """Returns the specification of a run from what its ``run.json`` holds, and its scenario."""
+    return RunSpec(
+        scenario,
+        content["strategy"],
+        content["engine"],
+        content["drivers"],
+        content["seed"],
+        tuple(sorted((content.get("settings") or {}).items())),
+    )
+
+
 def engine_checked(engine: str) -> str:
     """Returns the name of an engine; raises CorampError if there is none such."""
     if engine not in ENGINES:

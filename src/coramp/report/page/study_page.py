@@ -6,11 +6,8 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.records.files import read_json
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import check_version
-from coramp.records.schemas import RESULT_VERSION, RUNS, Row
-from coramp.records.stored_checks import checked_frame
+from coramp.records.schemas import Row
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -21,7 +18,7 @@ from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
-from coramp.report.study_folder import checked_study
+from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
@@ -34,7 +31,6 @@ from coramp.studies.shown import (
     shown_rows,
 )
 from coramp.studies.statistics import estimate
-from coramp.studies.store import MARK, Store
 from coramp.studies.summary import promises, summary_tables
 from coramp.studies.tables import Table, with_interval
 
@@ -60,9 +56,8 @@ def study_page(folder: Path) -> str:
     The runs that can be watched are those of which the study has kept records. Raises CorampError
     where there is no study, or none of its runs went well.
     """
-    content = _content(folder)
-    study = checked_study(folder / MARK, content)
-    runs = _runs(folder, study)
+    content = study_content(folder)
+    study, runs = stored_runs(folder)
     good = runs.filter(status="ok")
     if good.is_empty():
         reason = f": {runs['error'][0]}" if runs.height else ""
@@ -95,29 +90,6 @@ def _lists_arrivals(content: Row) -> bool:
     """Whether the study's scenario lists its arrivals."""
     scenario = content.get("scenario")
     return isinstance(scenario, dict) and bool(scenario.get("arrivals"))
-
-
-def _content(folder: Path) -> Row:
-    content = read_json(folder / MARK)
-    if not isinstance(content, dict) or content.get("kind") != "study":
-        raise CorampError(f"{folder / MARK}: does not describe a study; give another folder")
-    check_version(folder, content)
-    if content.get("result_version") != RESULT_VERSION:
-        raise CorampError(
-            f"{folder}: was written by an older coramp; run its study again in another folder"
-        )
-    return content
-
-
-def _runs(folder: Path, study: Study) -> pl.DataFrame:
-    path = folder / "runs.parquet"
-    if not path.exists():
-        store = Store(folder, study)
-        return store.frames(store.everything())[0]
-    try:
-        return checked_frame(path, pl.read_parquet(path), RUNS)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
 
 
 def _asked(study: Study, good: pl.DataFrame, *, listed: bool) -> Table:
