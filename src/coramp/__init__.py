@@ -12,7 +12,17 @@ from coramp import _registration
 from coramp.errors import CorampError
 
 if TYPE_CHECKING:
-    from coramp.api import PlanResult, RunResult, StudyResult, figures, plan, register, run, study
+    from coramp.api import (
+        PlanResult,
+        RunResult,
+        StudyResult,
+        figures,
+        load,
+        plan,
+        register,
+        run,
+        study,
+    )
 
 __all__ = [
     "CorampError",
@@ -20,6 +30,7 @@ __all__ = [
     "RunResult",
     "StudyResult",
     "figures",
+    "load",
     "plan",
     "register",
     "run",

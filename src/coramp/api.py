@@ -1,24 +1,25 @@
-"""What notebooks and the command line call: run, study, plan, figures, register."""
+"""What notebooks and the command line call: run, study, load, plan, figures, register."""
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
-
 from coramp.errors import CorampError
-from coramp.explain.decision import quantities
-from coramp.explain.quantity import Quantity
-from coramp.explain.words import NOT_TOLD, tried_lines
 from coramp.records.files import made_folder
-from coramp.records.run_folder import SUMO, not_replaceable, write_run
+from coramp.records.run import RunRecords
+from coramp.records.run_folder import MARK as RUN_MARK
+from coramp.records.run_folder import SUMO, not_replaceable, read_run, write_run
 from coramp.records.staging import staged_folder
-from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
-from coramp.runs.expected_queue import demand_above_limit, demands_above_limit
-from coramp.runs.planning import PlannedSnapshot, plan_snapshot
-from coramp.runs.running import RunSpec, broken_promises, engine_checked, make_spec, recorded
+from coramp.results import PlanResult, RunResult, StudyResult, as_pandas
+from coramp.runs.expected_queue import (
+    demand_above_limit,
+    demands_above_limit,
+    seeds_without_effect,
+)
+from coramp.runs.planning import plan_snapshot
+from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
 from coramp.scenarios.snapshots import load_snapshot
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
@@ -30,119 +31,29 @@ from coramp.studies.shown import keep_shown
 from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
-from coramp.studies.tables import Table
 from coramp.worlds.sumo.engine import SumoOptions
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from coramp.report.figures import FigureSet
 
+
+__all__ = [
+    "PlanResult",
+    "RunResult",
+    "StudyResult",
+    "as_pandas",
+    "figures",
+    "load",
+    "outlook",
+    "plan",
+    "register",
+    "run",
+    "study",
+]
 
 register = registry.register
 MANY_RUNS = 100_000
 """More runs than this are asked about first."""
-
-
-@dataclass(frozen=True)
-class RunResult(RunPlots):
-    """A run: its specification, its summary (the row of ``runs.parquet``) and its tables.
-
-    ``frames`` are the tables by name: vehicles and speeds, violations, and positions, or
-    trajectories and decisions if cooperative.
-    """
-
-    spec: RunSpec = field(kw_only=True)
-
-    @property
-    def broken_promises(self) -> list[str]:
-        """What a cooperative run promised and did not keep; empty where all is well."""
-        return broken_promises(self.summary)
-
-    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
-        """Returns the tables as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
-        return {name: as_pandas(frame) for name, frame in self.frames.items()}
-
-
-@dataclass(frozen=True)
-class StudyResult(StudyPlots):
-    """A study: one row a run, one row a run and stream, and the tables that sum them up.
-
-    ``layout`` is what kind of study it is: plain, paper, sensitivity or capacity.
-    """
-
-    folder: Path
-    runs: pl.DataFrame
-    streams: pl.DataFrame
-    tables: tuple[Table, ...]
-    layout: str = "plain"
-
-    @property
-    def failed(self) -> pl.DataFrame:
-        """The runs that failed, with their errors."""
-        return self.runs.filter(status="failed")
-
-    @property
-    def broken_promises(self) -> list[str]:
-        """What cooperative runs promised and did not keep, with their flows and seeds."""
-        return [
-            f"{row['strategy']}, {row['mainline_veh_h']:g} + {row['ramp_veh_h']:g} veh/h, "
-            f"seed {row['seed']}: {'; '.join(broken)}"
-            for row in self.runs.iter_rows(named=True)
-            if (broken := broken_promises(row))
-        ]
-
-    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
-        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
-        return {"runs": as_pandas(self.runs), "streams": as_pandas(self.streams)}
-
-
-@dataclass(frozen=True)
-class PlanResult(PlanPlots):
-    """Decisions on a snapshot, and all trajectories before and after them."""
-
-    planned: PlannedSnapshot
-
-    @property
-    def decisions(self) -> pl.DataFrame:
-        """One row a ramp vehicle, as in ``decisions.parquet``."""
-        return self.planned.decisions
-
-    @property
-    def attempts(self) -> pl.DataFrame:
-        """One row an attempt of a decision, as in ``attempts.parquet``."""
-        return self.planned.attempts
-
-    @property
-    def trajectories(self) -> pl.DataFrame:
-        """What every vehicle drives after the decisions, one row a piece."""
-        return self.planned.after
-
-    @property
-    def before(self) -> pl.DataFrame:
-        """What every vehicle would have driven; ramp vehicles stop before the nose."""
-        return self.planned.before
-
-    def quantities(self, vehicle_id: str) -> list[Quantity]:
-        """Returns every intermediate quantity of a ramp vehicle's decision."""
-        rows = self.decisions.filter(vehicle_id=vehicle_id)
-        if rows.is_empty():
-            known = ", ".join(self.decisions["vehicle_id"])
-            raise CorampError(f"{vehicle_id}: was not planned; planned were {known}")
-        attempts = self.attempts.filter(vehicle_id=vehicle_id).rows(named=True)
-        return quantities(rows.row(0, named=True), attempts, self.planned.scenario.rules())
-
-    def tried(self, vehicle_id: str) -> list[str]:
-        """Returns what was tried for a ramp vehicle and why it was refused, line by line."""
-        attempts = self.attempts.filter(vehicle_id=vehicle_id).rows(named=True)
-        return tried_lines(attempts) or [NOT_TOLD]
-
-    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
-        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
-        return {
-            "decisions": as_pandas(self.decisions),
-            "trajectories": as_pandas(self.trajectories),
-        }
 
 
 def run(
@@ -190,6 +101,8 @@ def run(
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
+    if notice is not None and seed != 1 and not spec.seed_matters:
+        notice(f"arrivals are listed: with {strategy} seed {seed} changes nothing")
     if out is None:
         return _executed(spec, SumoOptions(gui=gui, keep_messages=keep_messages), notice)
     with staged_folder(Path(out), not_replaceable) as stage:
@@ -202,7 +115,10 @@ def run(
 def _executed(
     spec: RunSpec, options: SumoOptions, notice: Callable[[str], None] | None
 ) -> RunResult:
-    records = recorded(spec, options, notice or (lambda _: None))
+    return _with_spec(recorded(spec, options, notice or (lambda _: None)), spec)
+
+
+def _with_spec(records: RunRecords, spec: RunSpec) -> RunResult:
     return RunResult(**{f.name: getattr(records, f.name) for f in fields(records)}, spec=spec)
 
 
@@ -234,6 +150,8 @@ def study(
     specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
     if notice is not None and (line := demands_above_limit(specs)) is not None:
+        notice(line)
+    if notice is not None and seeds > 1 and (line := seeds_without_effect(specs)) is not None:
         notice(line)
     with connected(cluster) if cluster is not None else nullcontext():
         store = Store(_folder_of(definition, out), definition)
@@ -297,6 +215,29 @@ def _folder_of(definition: Study, out: str | Path | None) -> Path:
     return Path(out) if out is not None else Path("out") / definition.name
 
 
+def load(folder: str | Path) -> RunResult | StudyResult:
+    """Returns the run or the study that lies in a folder, with its tables and figures.
+
+    Of a study that is not finished, what is done. Raises CorampError where there is neither, or it
+    cannot be read.
+    """
+    place = Path(folder)
+    if (place / STUDY_MARK).exists():
+        from coramp.report.study_folder import stored_runs, stored_streams
+
+        definition, runs = stored_runs(place)
+        streams = stored_streams(place, definition)
+        tables = tuple(summary_tables(definition, runs))
+        return StudyResult(place, runs, streams, tables, definition.layout)
+    if not (place / RUN_MARK).exists():
+        raise CorampError(
+            f"{place}: holds no run and no study; give a folder that coramp run --out or coramp "
+            "study has written"
+        )
+    records = read_run(place)
+    return _with_spec(records, stored_spec(records.content, records.scenario))
+
+
 def plan(snapshot: str, strategy: str = "mainline-priority") -> PlanResult:
     """Returns what a strategy decides on a snapshot: a built-in name or a TOML file.
 
@@ -339,20 +280,3 @@ def figures(
     specs = specs_of(seeds, found["paper"].horizon_s)
     runs = drawn_runs(folder / "study" / "runs", specs, progress or (lambda _: None))
     return save_figures(folder, found, runs)
-
-
-def as_pandas(frame: pl.DataFrame) -> "pd.DataFrame":
-    """Returns a polars frame as a pandas one, without pyarrow.
-
-    Raises CorampError where pandas is not installed.
-    """
-    try:
-        import pandas as pd
-    except ImportError:
-        raise CorampError("pandas is not installed; pip install pandas") from None
-    return pd.DataFrame(
-        {
-            column.name: column.to_numpy() if column.dtype.is_float() else column.to_list()
-            for column in frame
-        }
-    )

@@ -1,9 +1,12 @@
 """Every block of the tutorial, each how-to page and experiment runs, in a folder of its own.
 
-A block after ``<!-- not run: why -->`` is left out. Blocks of shell run under ``bash -e`` with this
-Python's folder first on the path; blocks of Python share one namespace a page.
+As a reader would follow it: all blocks in the order of the page, those of shell in one terminal, so
+that a ``cd`` holds on, under ``set -e`` and with this Python's folder first on the path. Blocks of
+Python share one namespace a page, and run where the terminal is. A block after
+``<!-- not run: why -->`` is left out.
 """
 
+import contextlib
 import os
 import re
 import subprocess
@@ -39,32 +42,67 @@ def blocks(text):
     ]
 
 
-def run_shell(code, folder):
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(
-        ["bash", "-e"],
-        input=code,
-        cwd=folder,
-        env={**os.environ, "PATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
+class Terminal:
+    """One bash for all blocks of a page."""
+
+    def __init__(self, folder, files):
+        self._block, self._log = files / "block.sh", files / "log.txt"
+        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        self._bash = subprocess.Popen(
+            ["bash"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=folder,
+            env={**os.environ, "PATH": path},
+        )
+
+    def run(self, code):
+        """Runs a block and returns the folder in which the terminal is then."""
+        self._block.write_text(code, encoding="utf-8")
+        self._bash.stdin.write(f"set -e; . {self._block} < /dev/null > {self._log} 2>&1; pwd\n")
+        self._bash.stdin.flush()
+        folder = self._bash.stdout.readline().strip()
+        assert folder, f"{code}\n{self._log.read_text(encoding='utf-8')}"
+        return folder
+
+    def close(self):
+        self._bash.stdin.close()
+        self._bash.stdout.close()
+        self._bash.wait()
+
+
+def follow(page, folder, files):
+    """Runs every block of a page, from a folder on."""
+    namespace = {"__name__": "__main__"}
+    with contextlib.closing(Terminal(folder, files)) as terminal:
+        for block in blocks(page.read_text(encoding="utf-8")):
+            if block.not_run:
+                continue
+            if block.kind == "sh":
+                os.chdir(terminal.run(block.code))
+            else:
+                source = "\n" * block.line + block.code  # so that errors name lines of the page
+                exec(compile(source, str(page), "exec"), namespace)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_page_runs(page, tmp_path, monkeypatch):
+def test_page_runs(page, tmp_path, tmp_path_factory, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    namespace = {"__name__": "__main__"}
-    for block in blocks(page.read_text(encoding="utf-8")):
-        if block.not_run:
-            continue
-        if block.kind == "sh":
-            run_shell(block.code, tmp_path)
-        else:
-            source = "\n" * block.line + block.code  # so that errors name lines of the page
-            exec(compile(source, str(page), "exec"), namespace)
+    follow(page, tmp_path, tmp_path_factory.mktemp("terminal"))
+
+
+def test_a_page_is_followed_in_one_terminal(tmp_path, tmp_path_factory, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page, files = tmp_path / "page.md", tmp_path_factory.mktemp("terminal")
+    page.write_text(
+        "```sh\nmkdir a\ncd a\nX=7\n```\n```python\nfrom pathlib import Path\n"
+        "assert Path.cwd().name == 'a'\n```\n```sh\ntest $X = 7\ntest -d ../a\n! false\n```\n"
+    )
+    follow(page, tmp_path, files)
+    page.write_text("```sh\ncd a\n```\n```sh\ncd a\n```\n")
+    with pytest.raises(AssertionError, match="No such file"):
+        follow(page, tmp_path, files)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -125,7 +125,7 @@ def test_formulas_are_drawn(built):
 def test_the_reference_has_signatures_and_docstrings(built):
     folder, _ = built
     for page, words in {
-        "api": ["coramp.api.run", "coramp.api.RunResult", "Runs a scenario once"],
+        "api": ["coramp.api.run", "coramp.results.RunResult", "Runs a scenario once"],
         "safe-distance": [
             "coramp.equations.safe_distance.safe_distance_m",
             "bumper to bumper (Eq. 1)",

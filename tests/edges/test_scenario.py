@@ -256,7 +256,6 @@ def arrivals(*given):
         (arrivals(("ramp", 1.0, 18.0)), "arrivals.0.speed_mps: 18 ", "up to 17 m/s"),
         (arrivals(("ramp", 1.05, 16.0)), "arrivals.0.time_s: 1.05 ", "multiples of 0.1 s"),
         (arrivals(("ramp", -1.0, 16.0)), "arrivals.0.time_s: -1 ", "at least 0"),
-        (arrivals(("ramp", 1800.1, 16.0)), "arrivals.0.time_s: 1800.1 ", "up to 1800 s"),
         (
             arrivals(("ramp", 5.0, 16.0), ("mainline", 1.0, 16.0), ("ramp", 5.0, 16.0)),
             "arrivals.2.time_s: 5 ",

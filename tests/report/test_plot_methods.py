@@ -110,10 +110,22 @@ def test_an_empty_window_is_refused(run, window):
         run.plot_time_space(*window)
 
 
-def test_ordinary_drivers_have_no_plans_to_draw(uncontrolled):
-    for draw in (uncontrolled.plot_time_space, lambda: uncontrolled.plot_decision("m00001")):
-        with pytest.raises(CorampError, match=r"^nobody was coordinated in this run; plot a coop"):
-            draw()
+def test_ordinary_drivers_have_no_decisions_to_draw(uncontrolled):
+    with pytest.raises(CorampError, match=r"^nobody was coordinated in this run; plot a coop"):
+        uncontrolled.plot_decision("m00001")
+
+
+def test_what_drivers_drove_is_drawn_as_well():
+    flows = {"mainline_veh_h": 1200, "ramp_veh_h": 600, "horizon_s": 60}
+    drivers = coramp.run("paper", "uncontrolled", **flows)
+    (axes,) = drivers.plot_time_space(10.0, 90.0).axes
+    lines = lines_of(axes)
+    merges = lines.pop("merges")
+    there = drivers.vehicles.filter((pl.col("entry_s") < 90.0) & (pl.col("exit_s") > 10.0))
+    assert set(lines) == set(there["vehicle_id"])
+    assert {to_hex(line.get_color()) for line in lines.values()} == {GREY, VERMILION}
+    assert 0 < len(merges.get_xdata()) <= sum(name.startswith("r") for name in lines)
+    assert all(-1.0 <= station_m <= 205.0 for station_m in merges.get_ydata())
 
 
 def test_speeds_of_both_streams_are_drawn(run, uncontrolled):
@@ -145,7 +157,7 @@ def test_figures_show_themselves_in_notebooks(run):
     assert run.plot_speeds()._repr_png_().startswith(b"\x89PNG\r\n")
 
 
-PAPER = ("plot_delay", "plot_gain", "plot_rungs")
+PAPER = ("plot_gain", "plot_rungs")
 LAYOUTS = {
     **dict.fromkeys(PAPER, "paper"),
     "plot_sensitivity": "sensitivity",

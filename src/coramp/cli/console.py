@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -9,13 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich import box
 from rich.console import Console
-from rich.table import Table as RichTable
 
 from coramp.api import PlanResult, RunResult, StudyResult
 from coramp.audit.verdicts import Audit
 from coramp.cli.run_table import run_table
+from coramp.cli.table_text import text_lines
+from coramp.cli.table_view import NARROW, fitted
 from coramp.equations.printed import in_words
 from coramp.explain.quantity import Quantity, printed_equations
 from coramp.explain.story import Story, told
@@ -27,31 +28,21 @@ from coramp.studies.tables import Table, number
 if TYPE_CHECKING:
     from coramp.report.figures import FigureSet
 
-WIDE = 240
-"""Columns of tables that do not go to a terminal."""
-
-
-def _console() -> Console:
-    return Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
-
 
 def print_json(data: Any) -> None:
     """Prints plain data as JSON."""
     print(json.dumps(finite_or_none(data), indent=2, allow_nan=False))
 
 
-def print_table(table: Table) -> None:
-    """Prints a table with its title above and its notes below."""
-    rich = RichTable(title=table.title, title_justify="left", box=box.SIMPLE_HEAD)
-    for column in table.columns:
-        rich.add_column(column, overflow="fold")
-    for row in table.rows:
-        rich.add_row(*row)
-    console = _console()
-    console.print(rich)
-    for note in table.notes:
-        console.print(note, markup=False)
-    console.print()
+def print_table(table: Table, wide: bool = False) -> None:
+    """Prints a table with its title above and its notes below.
+
+    It has the columns that a terminal's width holds, elsewhere those of 80 characters, or all if
+    ``wide``. What does not go to a terminal is not wrapped.
+    """
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    shown = table if wide else fitted(table, width or NARROW)
+    print("\n".join([*text_lines(shown, width), ""]))
 
 
 def print_listing(found: Mapping[str, Mapping[str, str]]) -> None:
@@ -92,19 +83,19 @@ def working(text: str) -> Iterator[None]:
         yield
 
 
-def print_run(result: RunResult, out: Path | None) -> None:
+def print_run(result: RunResult, out: Path | None, wide: bool = False) -> None:
     """Prints the summary of a run and where its records lie."""
-    print_table(run_table(result.summary))
+    print_table(run_table(result.summary), wide)
     if out is not None:
         print(f"Records are in {out}; coramp explain {out} VEHICLE tells one vehicle's story.")
 
 
-def print_audit(result: Audit) -> None:
+def print_audit(result: Audit, wide: bool = False) -> None:
     """Prints what an audit confirmed, and what not, one line a claim."""
     rows = tuple((check.claim, check.verdict, check.how) for check in result.checks)
     counts = Counter(check.verdict for check in result.checks)
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-    print_table(Table(f"{result.folder}: {told}", ("claim", "verdict", "how"), rows))
+    print_table(Table(f"{result.folder}: {told}", ("claim", "verdict", "how"), rows), wide)
 
 
 def quantity_table(title: str, quantities: list[Quantity]) -> Table:
@@ -113,10 +104,10 @@ def quantity_table(title: str, quantities: list[Quantity]) -> Table:
     return Table(title, ("Eq.", "symbol", "what", "value"), rows)
 
 
-def print_quantities(title: str, quantities: list[Quantity]) -> None:
+def print_quantities(title: str, quantities: list[Quantity], wide: bool = False) -> None:
     """Prints the quantities of a decision as a table, if there are any."""
     if quantities:
-        print_table(quantity_table(title, quantities))
+        print_table(quantity_table(title, quantities), wide)
 
 
 def print_equations(quantities: list[Quantity]) -> None:
@@ -135,14 +126,14 @@ def print_tried(title: str, lines: list[str]) -> None:
         print(f"  {line}")
 
 
-def print_plan(result: PlanResult) -> None:
+def print_plan(result: PlanResult, wide: bool = False) -> None:
     """Prints each ramp vehicle's decision with its quantities, then who was moved."""
     for decision in result.decisions.iter_rows(named=True):
         vehicle_id = decision["vehicle_id"]
         print(f"{vehicle_id}: {told(decision)}.")
         print_tried(f"Tried for {vehicle_id}", result.tried(vehicle_id))
         title = f"{vehicle_id}, rung {decision['rung']}"
-        print_quantities(title, result.quantities(vehicle_id))
+        print_quantities(title, result.quantities(vehicle_id), wide)
         print(f"{_checked(decision['min_margin_m'])}\n")
     vehicles = result.decisions["vehicle_id"].to_list()
     print_equations([q for name in vehicles for q in result.quantities(name)])
@@ -184,7 +175,7 @@ def _quantity_json(quantity: Quantity) -> Row:
     }
 
 
-def print_story(story: Story) -> None:
+def print_story(story: Story, wide: bool = False) -> None:
     """Prints a vehicle's story."""
     vehicle = story.vehicle
     name = vehicle["vehicle_id"]
@@ -213,7 +204,7 @@ def print_story(story: Story) -> None:
     for chapter in story.chapters:
         when, rung = number(chapter.decision["time_s"], 1), chapter.decision["rung"]
         print_tried(f"{name}, tried at {when} s", chapter.tried)
-        print_quantities(f"{name}, decision at {when} s, rung {rung}", chapter.quantities)
+        print_quantities(f"{name}, decision at {when} s, rung {rung}", chapter.quantities, wide)
     for plan in story.refused:
         print_tried(f"{name}, tried at {number(plan.time_s, 1)} s and refused", plan.tried)
     print_equations([quantity for chapter in story.chapters for quantity in chapter.quantities])
@@ -246,14 +237,14 @@ def story_json(story: Story) -> Row:
     }
 
 
-def print_study(result: StudyResult) -> None:
+def print_study(result: StudyResult, wide: bool = False) -> None:
     """Prints a study's tables and where they lie."""
     for table in result.tables:
-        print_table(table)
+        print_table(table, wide)
     print(f"Results are in {result.folder}: runs.parquet, streams.parquet, tables.md.")
 
 
-def print_outlook(ahead: Outlook) -> None:
+def print_outlook(ahead: Outlook, wide: bool = False) -> None:
     """Prints how far a study is, and how long the rest should take."""
     rows = [
         ("folder", str(ahead.folder)),
@@ -266,7 +257,7 @@ def print_outlook(ahead: Outlook) -> None:
     if ahead.searches_at_most:
         rows.append(("more for breakdown searches, at most", str(ahead.searches_at_most)))
     rows.append(("seconds for these, about", f"{ahead.expected_s:.0f} (jobs: {ahead.jobs})"))
-    print_table(Table("Outlook", ("what", "value"), tuple(rows)))
+    print_table(Table("Outlook", ("what", "value"), tuple(rows)), wide)
 
 
 def outlook_json(ahead: Outlook) -> Row:

@@ -5,8 +5,9 @@ from typing import NoReturn
 
 import typer
 
-from coramp.cli.commands import DEBUG, STOPPED, USAGE, WRONG, app
+from coramp.cli.commands import app
 from coramp.cli.native_output import send_native_output_to_stderr
+from coramp.cli.options import DEBUG, STOPPED, USAGE, WRONG
 from coramp.errors import CorampError, printable
 
 

@@ -23,7 +23,7 @@ class RunPlots(RunRecords):
         """Returns the time-space diagram of all vehicles: station (m) over time (s).
 
         From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Raises CorampError
-        for an uncontrolled run and for an empty window.
+        for an empty window.
         """
         from coramp.report.time_space_figure import run_time_space_figure
 
@@ -75,7 +75,7 @@ class PlanPlots:
 
 
 class StudyPlots:
-    """The figures of a study; each needs the layout that its runs are those of."""
+    """The figures of a study; but for ``plot_delay`` each needs the layout of its runs."""
 
     folder: Path
     runs: pl.DataFrame
@@ -88,14 +88,21 @@ class StudyPlots:
 
         return study_html(self.tables, self.layout, self.runs)
 
-    def plot_delay(self) -> "Figure":
-        """Returns mean delay (s) by flow with 95 % intervals over seeds, a diagram a stream.
+    def plot_delay(self, over: str | None = None) -> "Figure":
+        """Returns mean delay (s) over what varies, with 95 % intervals over seeds.
 
-        Raises CorampError for a study whose layout is not ``paper``, and where no run went well.
+        ``over`` is ``flow``, ``strategy`` or a dotted key that the study sets; left out, it is the
+        first that varies, and a study with the layout ``paper`` has a figure of its own. Below the
+        delays stand the differences between strategies, seed by seed on the same arrivals. Raises
+        CorampError for what does not vary, and where no run went well.
         """
-        from coramp.report.flow_figures import delay_figure
+        if over is None and self.layout == "paper":
+            from coramp.report.flow_figures import delay_figure
 
-        return delay_figure(self._drawn("paper"))
+            return delay_figure(self._good())
+        from coramp.report.varied_figure import varied_figure
+
+        return varied_figure(self._good(), over)
 
     def plot_gain(self) -> "Figure":
         """Returns the delay (%) that cooperation saves against both populations of drivers.
@@ -171,6 +178,10 @@ class StudyPlots:
                 f"{self.folder}: the study's layout is {self.layout}; this figure is of studies "
                 f"with the layout {layout}"
             )
+        return self._good()
+
+    def _good(self) -> pl.DataFrame:
+        """The runs that went well."""
         good = self.runs.filter(status="ok")
         if good.is_empty():
             raise CorampError(f"{self.folder}: no run went well; there is nothing to plot")

@@ -8,10 +8,11 @@ from pydantic import ValidationError
 
 from coramp.errors import CorampError
 from coramp.records.files import read_json
-from coramp.records.schemas import RUNS, Row
+from coramp.records.run_folder import check_version
+from coramp.records.schemas import RESULT_VERSION, RUNS, STREAMS, Row
 from coramp.records.stored_checks import checked_frame, first_of
 from coramp.studies.definition import Study
-from coramp.studies.store import MARK
+from coramp.studies.store import MARK, Store
 
 DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline")
 """The layouts of studies that there are figures of."""
@@ -67,3 +68,50 @@ def checked_study(mark: Path, content: Row) -> Study:
         return Study.model_validate(content.get("study"), strict=False)
     except ValidationError as error:
         raise CorampError(f"{mark}: study: {first_of(error)}; run the study again") from None
+
+
+def study_content(folder: Path) -> Row:
+    """Returns what ``study.json`` holds.
+
+    Raises CorampError where it describes no study, or one of another version.
+    """
+    content = read_json(folder / MARK)
+    if not isinstance(content, dict) or content.get("kind") != "study":
+        raise CorampError(f"{folder / MARK}: does not describe a study; give another folder")
+    check_version(folder, content)
+    if content.get("result_version") != RESULT_VERSION:
+        raise CorampError(
+            f"{folder}: was written by an older coramp; run its study again in another folder"
+        )
+    return content
+
+
+def stored_runs(folder: Path) -> tuple[Study, pl.DataFrame]:
+    """Returns a study and its runs from its folder, as many as are done.
+
+    Raises CorampError where there is none, or it cannot be read.
+    """
+    study = checked_study(folder / MARK, study_content(folder))
+    if _is_finished(folder):
+        return study, _frame(folder / "runs.parquet", RUNS)
+    store = Store(folder, study)
+    return study, store.frames(store.everything())[0]
+
+
+def stored_streams(folder: Path, study: Study) -> pl.DataFrame:
+    """Returns the table of streams of a study, as ``stored_runs`` those of its runs."""
+    if _is_finished(folder):
+        return _frame(folder / "streams.parquet", STREAMS)
+    store = Store(folder, study)
+    return store.frames(store.everything())[1]
+
+
+def _is_finished(folder: Path) -> bool:
+    return (folder / "runs.parquet").exists()
+
+
+def _frame(path: Path, schema: dict[str, type[pl.DataType] | pl.DataType]) -> pl.DataFrame:
+    try:
+        return checked_frame(path, pl.read_parquet(path), schema)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error

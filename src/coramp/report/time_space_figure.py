@@ -2,6 +2,7 @@
 
 import math
 
+import polars as pl
 from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
@@ -18,29 +19,28 @@ STEP_S = 0.25
 def run_time_space_figure(
     run: RunRecords, from_s: float | None = None, until_s: float | None = None
 ) -> Figure:
-    """Returns station (m) over time (s) of all vehicles of a cooperative run, a line each.
+    """Returns station (m) over time (s) of all vehicles of a run, a line each.
 
-    From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges; the gid
-    of a line is its vehicle's id. Raises CorampError for a run in which no vehicle was
-    coordinated and for an empty window.
+    From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges, those of
+    drivers where they were seen on the mainline first; the gid of a line is its vehicle's id.
+    Raises CorampError for an empty window.
     """
-    trajectories, decisions = run.coordinated("plot")
     from_s = 0.0 if from_s is None else from_s
     until_s = from_s + WINDOW_S if until_s is None else until_s
     if not (math.isfinite(from_s) and math.isfinite(until_s) and from_s < until_s):
         raise CorampError(f"until_s: {until_s:g} is not after from_s; allowed is above {from_s:g}")
-    moved = set(decisions["adjusted_vehicle_ids"].explode().drop_nulls())
+    moved = _moved(run)
     figure = new_figure(10.0, 5.6)
     axes = figure.subplots()
     lane_m = run.scenario.ramp.acceleration_lane_m
     axes.axhspan(0.0, lane_m, color=YELLOW, alpha=0.25, label="acceleration lane")
-    for name, driven in driven_of(trajectories, run.vehicles).items():
+    for name, driven in driven_of(run.motion, run.vehicles).items():
         times_s, stations_m = driven.line(from_s, until_s, STEP_S)
         if len(times_s):
             colour, label, width_pt = _look(driven, name in moved)
             axes.plot(times_s, stations_m, color=colour, linewidth=width_pt, label=label, gid=name)
-    within = decisions.drop_nulls("merge_time_s")
-    within = within.filter(within["merge_time_s"].is_between(from_s, until_s))
+    merges = _merges(run)
+    within = merges.filter(merges["merge_time_s"].is_between(from_s, until_s))
     if not within.is_empty():
         axes.plot(
             within["merge_time_s"],
@@ -62,6 +62,27 @@ def run_time_space_figure(
     grid(axes)
     legend_below(figure, [axes], 5)
     return figure
+
+
+def _moved(run: RunRecords) -> set[str]:
+    """The vehicles that were moved aside for another."""
+    if run.decisions is None:
+        return set()
+    return set(run.decisions["adjusted_vehicle_ids"].explode().drop_nulls())
+
+
+def _merges(run: RunRecords) -> pl.DataFrame:
+    """When (s) and where (m) ramp vehicles merged: as decided, or as drivers were seen to."""
+    if run.decisions is not None:
+        return run.decisions.drop_nulls("merge_time_s").select("merge_time_s", "merge_station_m")
+    on_ramp = run.vehicles.filter(stream="ramp")["vehicle_id"].to_list()
+    return (
+        run.motion.filter(pl.col("vehicle_id").is_in(on_ramp), lane="mainline")
+        .sort("time_s")
+        .group_by("vehicle_id", maintain_order=True)
+        .first()
+        .select(merge_time_s="time_s", merge_station_m="station_m")
+    )
 
 
 def _look(driven: Driven, moved: bool) -> tuple[str, str, float]:

@@ -7,6 +7,7 @@ from coramp.errors import CorampError
 from coramp.records.files import write_text
 from coramp.records.run import RunRecords
 from coramp.records.run_folder import MARK, REPLAY, REPORT, read_run
+from coramp.records.schemas import Row
 from coramp.report.page.pages import replay_page, run_page
 from coramp.report.page.study_page import study_page
 from coramp.scenarios.toml_files import builtin_names, override_text
@@ -59,6 +60,14 @@ def _scenario_file(name: str) -> str:
     return name if name in builtin_names("scenarios") else f"{name}.toml"
 
 
+def _flows(content: Row) -> list[str]:
+    """The options that give the flows; there are none where arrivals are listed."""
+    if content["specification"].get("arrivals"):
+        return []
+    pairs = (("--mainline", "mainline_veh_h"), ("--ramp", "ramp_veh_h"))
+    return [word for option, key in pairs for word in (option, f"{content[key]:.12g}")]
+
+
 def _repeat(stored: list[RunRecords]) -> list[str]:
     """The commands that run it again; a scenario of one's own is taken to lie in NAME.toml."""
     lines = []
@@ -67,8 +76,7 @@ def _repeat(stored: list[RunRecords]) -> list[str]:
         words = [
             *("coramp", "run", _scenario_file(content["scenario"])),
             *("--strategy", content["strategy"], "--engine", content["engine"]),
-            *("--mainline", f"{content['mainline_veh_h']:.12g}"),
-            *("--ramp", f"{content['ramp_veh_h']:.12g}"),
+            *_flows(content),
             *("--seed", str(content["seed"]), "--horizon", f"{horizon_s:.12g}"),
         ]
         if content["drivers"]:

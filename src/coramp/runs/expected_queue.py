@@ -36,6 +36,17 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
     return f"{len(told)} of {len(specs)} runs are above what their lane carries; such as {told[0]}"
 
 
+def seeds_without_effect(specs: Sequence[RunSpec]) -> str | None:
+    """Returns in a line which of some runs no seed changes, or None."""
+    fixed = {spec.strategy: None for spec in specs if not spec.seed_matters}
+    if not fixed:
+        return None
+    return (
+        f"arrivals are listed: no seed changes a run with {', '.join(fixed)}; each runs once, "
+        "without an interval"
+    )
+
+
 def _gaps(safety: Safety) -> str:
     gaps = (
         ("time gap", safety.time_gap_s, "s"),

@@ -20,6 +20,7 @@ from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, 
 from coramp.runs.unserved import unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
 from coramp.strategies.base import is_metered
@@ -84,6 +85,11 @@ class RunSpec:
         }
 
     @property
+    def seed_matters(self) -> bool:
+        """Whether another seed is another run: not where all is listed and nobody is a driver."""
+        return self.drivers is not None or not self.scenario.arrivals
+
+    @property
     def settings(self) -> str | None:
         """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
         return json.dumps(dict(self.overrides), default=str) if self.overrides else None
@@ -125,12 +131,13 @@ def make_spec(
         )
     if not isinstance(seed, int) or not 0 <= seed < 2**31:
         raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
-    others, values = dict(overrides or {}), (mainline_veh_h, ramp_veh_h, horizon_s)
+    others, blame_kmh = overrides_in_mps(overrides or {}, dict.fromkeys(overrides or {}, "--set"))
+    values = (mainline_veh_h, ramp_veh_h, horizon_s)
     named = {key: v for key, v in zip(OPTIONS, values, strict=True) if v is not None}
     if twice := sorted(named.keys() & others.keys()):
         options = ", ".join(f"{key} by {OPTIONS[key]} and by --set" for key in twice)
         raise CorampError(f"{blamed or '--set'}: {options}: given twice; allowed is once")
-    blame = {**dict.fromkeys(others, "--set"), **{key: OPTIONS[key] for key in named}}
+    blame = {**blame_kmh, **{key: OPTIONS[key] for key in named}}
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
@@ -145,6 +152,18 @@ def make_spec(
     if chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def stored_spec(content: Row, scenario: Scenario) -> RunSpec:
+    """Returns the specification of a run from what its ``run.json`` holds, and its scenario."""
+    return RunSpec(
+        scenario,
+        content["strategy"],
+        content["engine"],
+        content["drivers"],
+        content["seed"],
+        tuple(sorted((content.get("settings") or {}).items())),
+    )
 
 
 def engine_checked(engine: str) -> str:

@@ -75,9 +75,10 @@ def _place_problems(scenario: "Scenario") -> list[str]:
             f"ramp.detector_station_m: {scenario.detector_station_m:g} is not beside the "
             f"acceleration lane; allowed is up to {ramp.acceleration_lane_m:g} m"
         )
-    if not ramp.start_m < ramp.decision_station_m < scenario.stop_station_m:
+    given_m = ramp.decision_station_m
+    if given_m is not None and not ramp.start_m < given_m < scenario.stop_station_m:
         problems.append(
-            f"ramp.decision_station_m: {ramp.decision_station_m:g} is not on the ramp before the "
+            f"ramp.decision_station_m: {given_m:g} is not on the ramp before the "
             f"stop; allowed is between {ramp.start_m:g} and {scenario.stop_station_m:g} m"
         )
     if scenario.stop_station_m > -scenario.run_up_m:
@@ -89,6 +90,8 @@ def _place_problems(scenario: "Scenario") -> list[str]:
 
 
 def _flow_problems(scenario: "Scenario") -> list[str]:
+    if scenario.arrivals:
+        return _list_problems(scenario)
     problems = []
     for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
         most = 3600.0 / stream.min_headway_s
@@ -99,7 +102,21 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
             for key, flow in flows
             if flow is not None and flow >= most
         ]
+    return problems
+
+
+def _list_problems(scenario: "Scenario") -> list[str]:
+    problems = []
     last_s: dict[str, float] = {}
+    late = [k for k, a in enumerate(scenario.arrivals) if a.time_s > scenario.simulation.horizon_s]
+    if late:
+        first_s = scenario.arrivals[late[0]].time_s
+        least_s = math.ceil(max(a.time_s for a in scenario.arrivals))
+        problems.append(
+            f"simulation.horizon_s: {scenario.simulation.horizon_s:g} is too short for the list: "
+            f"{len(late)} of {len(scenario.arrivals)} arrivals lie beyond it, the first "
+            f"arrivals.{late[0]} at {first_s:g} s; allowed is at least {least_s} s"
+        )
     for number, arrival in enumerate(scenario.arrivals):
         key = f"arrivals.{number}"
         limit = getattr(scenario, arrival.stream).limit_mps
@@ -112,11 +129,6 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
             problems.append(
                 f"{key}.time_s: {arrival.time_s:g} does not come after the one before it on the "
                 f"{arrival.stream}; allowed is above {last_s[arrival.stream]:g} s"
-            )
-        if arrival.time_s > scenario.simulation.horizon_s:
-            problems.append(
-                f"{key}.time_s: {arrival.time_s:g} lies beyond simulation.horizon_s; "
-                f"allowed is up to {scenario.simulation.horizon_s:g} s"
             )
         if not is_multiple(arrival.time_s, scenario.control.step_s):
             problems.append(
@@ -195,12 +207,8 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
         need_m = least * usable_m / motion.ramp_acceleration_mps2 + lane_m - usable_m
         asked = f"Eq. 22 asks for {least:.2f} m/s2, more than motion.ramp_acceleration_mps2"
         return [f"{key}: {lane_m:g} is too short: {asked}; allowed is above {need_m:.1f} m"]
-    problems = []
-    if not least <= motion.free_acceleration_mps2 <= motion.ramp_acceleration_mps2:
-        problems.append(
-            f"motion.free_acceleration_mps2: {motion.free_acceleration_mps2:g} is outside Eq. 22; "
-            f"allowed is {least:.3f} to {motion.ramp_acceleration_mps2:g} m/s2"
-        )
+    found = _free_acceleration_problem(scenario, least)
+    problems = [found] if found else []
     first, last = decision_station_range_m(scenario)
     if gaps := _gap_problems(scenario, first, last):
         problems += gaps
@@ -210,13 +218,40 @@ def _planning_problems(scenario: "Scenario") -> list[str]:
             f"({first:.1f} m or later) and it can still stop ({last:.1f} m or earlier); "
             "allowed are an earlier mainline.start_m, a shorter acceleration lane, harder braking"
         )
-    elif not first <= ramp.decision_station_m <= last:
+    elif not first <= scenario.decision_station_m <= last:
         problems.append(
-            f"ramp.decision_station_m: at {ramp.decision_station_m:g} m not every vehicle that "
+            f"ramp.decision_station_m: at {scenario.decision_station_m:g} m not every vehicle that "
             "matters has entered, or it is too late to stop; "
             f"allowed is {first:.1f} to {last:.1f} m"
         )
     return problems
+
+
+def _free_acceleration_problem(scenario: "Scenario", least_mps2: float) -> str:
+    """What is wrong where the ordinary acceleration does not fit the lane, else nothing.
+
+    Blamed is the acceleration where it was given, else the lane.
+    """
+    motion, ramp, v0 = scenario.motion, scenario.ramp, scenario.mainline.speed_mps
+    free_mps2, most_mps2 = motion.free_acceleration_mps2, motion.ramp_acceleration_mps2
+    key = "motion.free_acceleration_mps2"
+    allowed = f"{math.ceil(1000.0 * least_mps2) / 1000.0:g} to {most_mps2:g} m/s2"
+    if free_mps2 > most_mps2:
+        return f"{key}: {free_mps2:g} is above motion.ramp_acceleration_mps2; allowed is {allowed}"
+    if free_mps2 >= least_mps2:
+        return ""
+    usable_m, lane_m = scenario.last_merge_station_m, ramp.acceleration_lane_m
+    need_m = least_mps2 * usable_m / free_mps2 + lane_m - usable_m
+    way = f"from {ramp.speed_mps:g} to {v0:g} m/s"
+    if "free_acceleration_mps2" in motion.model_fields_set:
+        return (
+            f"{key}: {free_mps2:g} does not get a vehicle {way} within ramp.acceleration_lane_m "
+            f"{lane_m:g} (Eq. 22); allowed is {allowed}, or a lane above {need_m:.1f} m"
+        )
+    return (
+        f"ramp.acceleration_lane_m: {lane_m:g} is too short to get {way} with {key} {free_mps2:g}; "
+        f"allowed is above {need_m:.1f} m, or {key} of {allowed} (Eq. 22)"
+    )
 
 
 def _gap_problems(scenario: "Scenario", first_m: float, last_m: float) -> list[str]:
@@ -258,9 +293,9 @@ def decision_station_range_m(scenario: "Scenario") -> tuple[float, float]:
     The first: a mainline vehicle that enters just then must come behind the subject even if this
     merges with the least acceleration. The last: from there it can still stop before the nose.
     """
-    road, safety = scenario.rules().road, scenario.rules().safety
+    rules = scenario.rules_with(math.nan)  # of the station itself nothing here depends
+    road, safety, control = rules.road, rules.safety, scenario.control
     v0, ramp_mps = road.mainline_speed_mps, road.ramp_speed_mps
-    control = scenario.control
     least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
     behind_m = (
         lag_m(v0, ramp_mps, least)

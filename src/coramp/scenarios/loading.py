@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from coramp.errors import CorampError
+from coramp.scenarios.defaults import with_defaults
+from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
 
 
@@ -19,9 +22,13 @@ def load_scenario(
     with a message for each thing that is wrong.
     """
     label, data = read("scenarios", name)
+    data, in_kmh = data_in_mps(data, label)
     overrides = overrides or {}
     blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
-    return validated(Scenario, with_overrides(data, overrides, blamed), label, blamed)
+    overrides, blamed = overrides_in_mps(overrides, blamed)
+    data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
+    data = with_defaults(with_listed_flows(data, label, blamed), label)
+    return validated(Scenario, data, label, {**in_kmh, **blamed})
 
 
 def builtin_scenarios() -> list[Scenario]:

@@ -22,6 +22,7 @@ from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import braking_distance_m
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
+from coramp.scenarios.stations import chosen_decision_station_m
 from coramp.scenarios.vehicle_types import VehicleType
 from coramp.strategies.parameters import Value
 from coramp.vehicles.traits import CAR, Traits
@@ -73,7 +74,7 @@ class Stream(Model):
     entry_speed_mps: SpeedRange
     flow_veh_h: Flow
     flow_to_veh_h: Flow | None = None
-    min_headway_s: Headway
+    min_headway_s: Headway = 0.6
 
     @property
     def flows_veh_h(self) -> tuple[float, float]:
@@ -91,16 +92,18 @@ class Mainline(Stream):
 class Ramp(Stream):
     """The ramp, which ends at station 0, and the acceleration lane behind it.
 
-    ``stop_station_m`` is where a vehicle stops that has no merge yet; left out, it is as near to
-    the nose as still lets it reach v0 in time from a stand. ``detector_station_m`` is that of the
-    mainline's loop for ramp metering; left out, it is three quarters along the lane.
-    ``signal_station_m`` is that of its stop line; left out, it is 60 m before the nose, or a
-    quarter of a shorter ramp, so that who was stopped can speed up before it merges.
+    ``decision_station_m`` is where a vehicle is planned; left out, it is early among the stations
+    at which that is possible. ``stop_station_m`` is where a vehicle stops that has no merge yet;
+    left out, it is as near to the nose as still lets it reach v0 in time from a stand.
+    ``detector_station_m`` is that of the mainline's loop for ramp metering; left out, it is three
+    quarters along the lane. ``signal_station_m`` is that of its stop line; left out, it is 60 m
+    before the nose, or a quarter of a shorter ramp, so that who was stopped can speed up before it
+    merges.
     """
 
     acceleration_lane_m: Annotated[float, Field(gt=0.0, le=5000.0)]
     merge_angle_deg: Annotated[float, Field(ge=0.0, lt=90.0)] = 30.0
-    decision_station_m: Annotated[float, Field(lt=0.0)] = -200.0
+    decision_station_m: Annotated[float, Field(lt=0.0)] | None = None
     stop_station_m: Annotated[float, Field(lt=0.0)] | None = None
     detector_station_m: Annotated[float, Field(gt=0.0)] | None = None
     signal_station_m: Annotated[float, Field(le=-1.0)] | None = None
@@ -301,12 +304,16 @@ class Scenario(Model):
 
     def rules(self) -> Rules:
         """Returns what planners are bound by."""
+        return self.rules_with(self.decision_station_m)
+
+    def rules_with(self, decision_station_m: float) -> Rules:
+        """Returns what planners are bound by, with decisions at a station."""
         return Rules(
             Road(
                 mainline_start_m=self.mainline.start_m,
                 mainline_end_m=self.mainline.end_m,
                 ramp_start_m=self.ramp.start_m,
-                decision_station_m=self.ramp.decision_station_m,
+                decision_station_m=decision_station_m,
                 stop_station_m=self.stop_station_m,
                 acceleration_lane_m=self.ramp.acceleration_lane_m,
                 last_merge_station_m=self.last_merge_station_m,
@@ -334,6 +341,12 @@ class Scenario(Model):
     def last_merge_station_m(self) -> float:
         """The last station of a merge: a step's travel, and half a metre, before the lane ends."""
         return self.ramp.acceleration_lane_m - self.mainline.speed_mps * self.control.step_s - 0.5
+
+    @property
+    def decision_station_m(self) -> float:
+        """Where ramp vehicles are planned: as given, or as suits the speeds."""
+        given = self.ramp.decision_station_m
+        return chosen_decision_station_m(self) if given is None else given
 
     @property
     def stop_station_m(self) -> float:

@@ -9,7 +9,7 @@ from coramp.equations.safe_distance import safe_distance_m
 from coramp.errors import CorampError
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Model, Scenario, Speed
-from coramp.scenarios.toml_files import read, validated
+from coramp.scenarios.toml_files import beside, read, validated
 
 
 class SnapshotVehicle(Model):
@@ -55,6 +55,8 @@ class Snapshot(Model):
 def load_snapshot(name: str) -> Snapshot:
     """Returns the built-in snapshot of that name, or that of a file."""
     label, data = read("snapshots", name)
+    if isinstance(data.get("scenario"), str):
+        data["scenario"] = beside(name, data["scenario"])
     return validated(Snapshot, data, label)
 
 

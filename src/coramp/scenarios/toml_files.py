@@ -2,7 +2,6 @@
 
 import difflib
 import json
-import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -21,12 +20,11 @@ from coramp.scenarios.plain_data import (
     problem_with,
     shortened,
 )
+from coramp.scenarios.validation_lines import lines_of
 
 AnyModel = TypeVar("AnyModel", bound=BaseModel)
 Data = dict[str, Any]
 KINDS = ("scenarios", "snapshots", "studies")
-SHAPES = ("(one)", "(list)")
-"""Tags of a value that may be one or a list; they are no part of its key."""
 
 
 def builtin_names(kind: str) -> list[str]:
@@ -72,6 +70,14 @@ def read(kind: str, name: str) -> tuple[str, Data]:
     return label, data
 
 
+def beside(name: str, scenario: str) -> str:
+    """Returns the scenario that a file names, as ``read`` takes it from anywhere.
+
+    A built-in one keeps its name; the path of a file counts from the folder of the file ``name``.
+    """
+    return scenario if scenario in builtin_names("scenarios") else str(Path(name).parent / scenario)
+
+
 def _parsed(text: str, label: str) -> Data:
     """Returns the content of a TOML text; errors begin with the label."""
     if (key := long_key_in(text)) is not None:
@@ -94,7 +100,7 @@ def _text_of(path: Path, kind: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        near = difflib.get_close_matches(str(path), builtin_names(kind), 1)
+        near = difflib.get_close_matches(path.name, builtin_names(kind), 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise CorampError(f"{path}: no such file or built-in{hint}; built in are {known}") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -201,12 +207,13 @@ def validated(
 
     Raises CorampError with one message for each problem: where, which key, what is wrong, what is
     allowed. ``overridden`` names where overridden keys came from, to be told instead of the label;
-    an empty name leaves it to the caller to tell.
+    an empty name leaves it to the caller to tell. What must fit together is checked once every key
+    by itself is right; unknown keys do not keep it from being told.
     """
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        lines = [line for problem in _causes(error) for line in _lines_of(model, problem)]
+        lines = lines_of(model, data, error)
     messages = []
     for line in dict.fromkeys(lines):
         key = line.split(":", 1)[0]
@@ -221,88 +228,3 @@ def validated(
 
 def _blamed(line: str, origin: str) -> str:
     return f"{origin}: {line}" if origin else line
-
-
-def _causes(error: ValidationError) -> list[Any]:
-    """The problems without those that only follow: a list whose items fail counts as too short."""
-    problems = error.errors()
-    places = [problem["loc"] for problem in problems]
-    return [
-        problem
-        for problem in problems
-        if problem["type"] != "too_short"
-        or not any(p[: len(problem["loc"])] == problem["loc"] != p for p in places)
-    ]
-
-
-def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
-    if problem["type"] == "value_error":
-        return str(problem["ctx"]["error"]).splitlines()
-    key = ".".join(str(part) for part in problem["loc"] if part not in SHAPES)
-    value, context = problem["input"], problem.get("ctx", {})
-    shown = f"{value:g}" if isinstance(value, float) else repr(value)
-    match problem["type"]:
-        case "extra_forbidden":
-            return [f"{key}: unknown key; {_allowed_keys(model, problem['loc'])}"]
-        case "missing":
-            return [f"{key}: is missing; it must be given"]
-        case "finite_number":
-            return [f"{key}: {shown} is not finite; allowed is a finite number"]
-        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
-            return [f"{key}: {shown} is {_out_of_range(key, float(value), context)}"]
-        case "float_type" | "int_type":
-            return [f"{key}: {shown} is not a number; allowed is a number"]
-        case "literal_error":
-            return [f"{key}: {shown} is not known; allowed is {context['expected']}"]
-        case "model_type" | "dict_type" | "model_attributes_type":
-            return [f"{key}: {shown} is not a table; allowed is a TOML table"]
-        case (
-            "tuple_type"
-            | "list_type"
-            | "too_short"
-            | "too_long"
-            | "missing_positional_only_argument"
-        ):
-            field = model.model_fields.get(str(problem["loc"][0]))
-            tables = field is not None and _model_within(field.annotation) is not None
-            example = "of tables" if tables and len(problem["loc"]) == 1 else "like [15.0, 20.0]"
-            return [f"{key}: {shown} has the wrong shape; allowed is a list {example}"]
-        case _:
-            message = problem["msg"]
-            return [f"{key}: {shown}: {message[0].lower()}{message[1:]}"]
-
-
-def _out_of_range(key: str, value: float, context: Mapping[str, float]) -> str:
-    bounds = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
-    (name, bound), *_ = ((n, b) for n, b in context.items() if n in bounds)
-    side = "too small" if name in ("gt", "ge") else "too large"
-    text = f"{side}; allowed is {bounds[name]} {bound:g}"
-    if "speed_mps" in key or "limit_mps" in key:
-        text += " m/s"
-        if name == "le" and math.isfinite(value):
-            text += f" (if {value:g} is meant in km/h, write {value / 3.6:.4g})"
-    return text
-
-
-def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    for part in location[:-1]:
-        field = model.model_fields.get(str(part))
-        inner = field.annotation if field is not None else None
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
-            model = inner
-        elif not isinstance(part, int):
-            model = _model_within(inner) or model
-    names = sorted(model.model_fields)
-    near = difflib.get_close_matches(str(location[-1]), names, 1)
-    hint = f"did you mean {near[0]}? " if near else ""
-    return f"{hint}allowed are {', '.join(names)}"
-
-
-def _model_within(annotation: Any) -> type[BaseModel] | None:
-    for argument in getattr(annotation, "__args__", ()):
-        if isinstance(argument, type) and issubclass(argument, BaseModel):
-            return argument
-        inner = _model_within(argument)
-        if inner is not None:
-            return inner
-    return None

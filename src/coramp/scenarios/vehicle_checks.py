@@ -49,7 +49,7 @@ def _type_problems(scenario: "Scenario", kind: VehicleType) -> list[str]:
             f"allowed is up to {scenario.ramp.acceleration_lane_m:g} m"
         )
     if kind.braking_mps2 is not None and kind.braking_mps2 < scenario.stop_mps2:
-        way_m = scenario.stop_station_m - scenario.ramp.decision_station_m
+        way_m = scenario.stop_station_m - scenario.decision_station_m
         need_mps2 = 0.5 * scenario.ramp.limit_mps**2 / way_m
         if kind.braking_mps2 < need_mps2:
             problems.append(

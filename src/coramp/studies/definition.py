@@ -6,12 +6,12 @@ from dataclasses import replace
 from itertools import product
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from coramp.errors import CorampError
 from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
 from coramp.scenarios.model import Flow, Model
-from coramp.scenarios.toml_files import read, validated
+from coramp.scenarios.toml_files import beside, read, validated
 from coramp.strategies.registry import strategy_named
 
 Flows = Annotated[tuple[Flow, ...], Field(strict=False)]
@@ -23,7 +23,7 @@ class Grid(Model):
     """Runs of every combination of what is listed, with every seed.
 
     Flows are those of ``mainline_veh_h`` by those of ``ramp_veh_h``, or the pairs of
-    ``flows_veh_h``.
+    ``flows_veh_h``; left out, they are the scenario's own, or its listed arrivals.
     ``set`` gives lists of values for dotted keys of the scenario. ``drivers`` count only for
     strategies that leave vehicles to their drivers, whose engine is always sumo.
     """
@@ -40,17 +40,20 @@ class Grid(Model):
 
     @model_validator(mode="after")
     def _has_flows(self) -> Self:
-        if bool(self.flows_veh_h) == bool(self.mainline_veh_h and self.ramp_veh_h):
+        keys = ("flows_veh_h", "mainline_veh_h", "ramp_veh_h")
+        named = {key for key in keys if getattr(self, key)}
+        if named not in (set(), {"flows_veh_h"}, {"mainline_veh_h", "ramp_veh_h"}):
             raise ValueError(
                 "runs: flows are missing or given twice; allowed is either mainline_veh_h with "
-                "ramp_veh_h, or flows_veh_h"
+                "ramp_veh_h, or flows_veh_h, or neither for the scenario's own"
             )
         return self
 
     @property
-    def flows(self) -> tuple[tuple[float, float], ...]:
-        """All pairs of mainline and ramp flow."""
-        return self.flows_veh_h or tuple(product(self.mainline_veh_h, self.ramp_veh_h))
+    def flows(self) -> tuple[tuple[float | None, float | None], ...]:
+        """All pairs of mainline and ramp flow; None stands for the scenario's own."""
+        crossed = tuple(product(self.mainline_veh_h, self.ramp_veh_h))
+        return self.flows_veh_h or crossed or ((None, None),)
 
 
 class Search(Model):
@@ -100,8 +103,11 @@ class Search(Model):
 class Study(Model):
     """A named set of grids on one scenario; ``layout`` says which tables sum it up.
 
-    Its name is that of its folder below ``out/``.
+    Its name is that of its folder below ``out/``. ``scenario`` is a built-in one, or a file whose
+    path counts from the study's own file.
     """
+
+    _file: str | None = PrivateAttr(default=None)
 
     name: Annotated[str, Field(min_length=1, max_length=100)]
     description: str = ""
@@ -130,6 +136,16 @@ class Study(Model):
             raise ValueError("runs: there are none; allowed is at least one of runs and searches")
         return self
 
+    @property
+    def source(self) -> str:
+        """The scenario as ``load_scenario`` takes it, from whatever folder."""
+        return self.scenario if self._file is None else beside(self._file, self.scenario)
+
+    def read_from(self, file: str) -> Self:
+        """Returns the study as one that was read from a file."""
+        self._file = file
+        return self
+
     def on_engine(self, engine: str) -> "Study":
         """Returns the study with its cooperative runs on another engine."""
         return self.model_copy(
@@ -143,12 +159,13 @@ class Study(Model):
 def load_study(name: str) -> Study:
     """Returns the built-in study of that name, or that of a file."""
     label, data = read("studies", name)
-    return validated(Study, data, label)
+    return validated(Study, data, label).read_from(name)
 
 
 def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     """Returns all runs of a study, sorted by their keys; what two grids share is run once.
 
+    So is, with the first seed, what no seed changes: cooperative runs of listed arrivals.
     Raises CorampError with a message for every combination that cannot be run; ``label`` is the
     file to name, else it is the study's name.
     """
@@ -168,7 +185,7 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
             except CorampError as error:
                 problems.update(dict.fromkeys(error.messages))
                 continue
-            for seed in range(1, seeds + 1):
+            for seed in range(1, 1 + (seeds if first.seed_matters else 1)):
                 spec = replace(first, seed=seed)
                 specs.setdefault(spec.run_id, spec)
     if problems:
@@ -180,14 +197,14 @@ def _check_source(study: Study, seeds: int, label: str) -> None:
     if seeds < 1:
         raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
     try:
-        read("scenarios", study.scenario)
+        read("scenarios", study.source)
     except CorampError as error:
         raise CorampError(*(f"{label}: scenario: {line}" for line in error.messages)) from None
 
 
 def spec_of(study: Study, arguments: dict[str, Any]) -> RunSpec:
     """Returns the specification of one run of a study, with the first seed."""
-    return make_spec(study.scenario, horizon_s=study.horizon_s, blamed="", **arguments)
+    return make_spec(study.source, horizon_s=study.horizon_s, blamed="", **arguments)
 
 
 def _combinations(grid: Grid) -> Iterator[dict[str, Any]]:
@@ -217,7 +234,7 @@ def variants(asked: Grid | Search) -> Iterator[dict[str, Any]]:
 
 
 def count_runs(study: Study, seeds: int) -> int:
-    """Returns how many runs a study has at most."""
+    """Returns how many runs a study has at most; what no seed changes counts with every seed."""
     grids = sum(len(grid.flows) * sum(1 for _ in variants(grid)) for grid in study.runs)
     searches = sum(
         len(search.ramp_veh_h) * sum(1 for _ in variants(search)) * search.runs_at_most

@@ -15,6 +15,7 @@ from coramp.records.run_folder import MARK, not_replaceable, read_run, write_run
 from coramp.records.schemas import Row
 from coramp.records.staging import staged_folder
 from coramp.runs.running import RunSpec, make_spec, recorded
+from coramp.scenarios.loading import load_scenario
 from coramp.studies.definition import Study
 
 FOLDER = "shown"
@@ -92,12 +93,13 @@ def same_delays(row: Row, again: Row) -> bool:
 
 def _again(study: Study, row: Row) -> RunSpec:
     """A run of the study once more; cooperative ones need no simulator."""
+    listed = bool(load_scenario(study.source).arrivals)
     return make_spec(
-        study.scenario,
+        study.source,
         row["strategy"],
         engine="sumo" if row["drivers"] else "exact",
-        mainline_veh_h=row["mainline_veh_h"],
-        ramp_veh_h=row["ramp_veh_h"],
+        mainline_veh_h=None if listed else row["mainline_veh_h"],
+        ramp_veh_h=None if listed else row["ramp_veh_h"],
         drivers=row["drivers"],
         seed=row["seed"],
         horizon_s=study.horizon_s,

@@ -25,6 +25,7 @@ from coramp.records.files import (
 from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAMS, Row
 from coramp.records.unfinished import is_unfinished
 from coramp.runs.running import RunSpec, versions
+from coramp.scenarios.loading import load_scenario
 from coramp.studies.definition import Study
 
 ROWS_AT_A_TIME = 1000
@@ -94,7 +95,7 @@ class Store:
                 f"{self.folder}: holds other files and no study; give another or an empty folder"
             )
         made_folder(self.folder)
-        write_json(mark, content)
+        write_json(mark, {**content, "scenario": _scenario_of(study)})
 
     def _is_ours(self) -> bool:
         """Whether all in the folder is a study's; tables alone may be somebody else's."""
@@ -172,6 +173,14 @@ class Store:
         write_parquet(self.folder / "runs.parquet", runs)
         write_parquet(self.folder / "streams.parquet", streams)
         write_text(self.folder / "tables.md", markdown)
+
+
+def _scenario_of(study: Study) -> Row | None:
+    """The study's scenario as it is, None where it is valid only with what the study sets."""
+    try:
+        return load_scenario(study.source).model_dump(mode="json")
+    except CorampError:
+        return None
 
 
 def _part_in(path: Path) -> Part | None:

@@ -11,6 +11,7 @@ from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
 from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.field_layout import field_tables
+from coramp.studies.paired import paired_table
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
 from coramp.studies.statistics import Estimate, estimate
@@ -25,18 +26,30 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "drivers": drivers_tables,
     "worth": worth_tables,
 }
+IMPORTANT = (
+    "scenario",
+    "strategy",
+    "flow (veh/h)",
+    "delay of all (s)",
+    "mainline delay (s)",
+    "ramp delay (s)",
+    "unserved",
+    "runs",
+)
+"""Columns of the overview that a narrow terminal keeps first."""
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
 
 def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
-    """Returns a study's tables: those of its layout, then every group of runs, then promises."""
+    """Returns a study's tables: those of its layout, every group of runs, differences, promises."""
     good = runs.filter(status="ok")
     if study.layout == "capacity":
         own = capacity_tables(good, study.horizon_s)
     else:
         make = LAYOUTS.get(study.layout)
         own = make(good) if make is not None else []
-    return [*own, overview(good), promises(runs)]
+    paired = paired_table(good) if study.layout == "plain" else None
+    return [*own, overview(good), *([paired] if paired is not None else []), promises(runs)]
 
 
 def overview(good: pl.DataFrame) -> Table:
@@ -81,7 +94,7 @@ def overview(good: pl.DataFrame) -> Table:
         "hardest braking (m/s2)",
     )
     note = "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle."
-    return Table("All runs", columns, tuple(rows), (note,))
+    return Table("All runs", columns, tuple(rows), (note,), IMPORTANT)
 
 
 def promises(runs: pl.DataFrame) -> Table:

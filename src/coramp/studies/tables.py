@@ -8,12 +8,17 @@ from coramp.studies.statistics import Estimate
 
 @dataclass(frozen=True)
 class Table:
-    """A titled table of text cells, with notes below it."""
+    """A titled table of text cells, with notes below it.
+
+    ``importance`` names columns in the order in which a narrow terminal keeps them; the others
+    come after, from left to right.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    importance: tuple[str, ...] = ()
 
     def to_markdown(self) -> str:
         """Returns the table as Markdown."""

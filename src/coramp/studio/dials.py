@@ -187,7 +187,7 @@ def _planning(scenario: Scenario, changed: Mapping[str, float]) -> Iterator[tupl
         return
     first_m, last_m = decision_station_range_m(road)
     own_m = scenario.ramp.decision_station_m
-    if first_m <= last_m and not first_m <= own_m <= last_m:
+    if own_m is not None and first_m <= last_m and not first_m <= own_m <= last_m:
         inside = (
             math.ceil(10.0 * first_m) / 10.0 if own_m < first_m else math.floor(10 * last_m) / 10
         )

@@ -48,11 +48,31 @@ def check_same_arrivals(runs: Sequence[RunRecords]) -> None:
     columns = ["vehicle_id", "scheduled_s"]
     for run in runs[1:]:
         if not run.vehicles.select(columns).equals(runs[0].vehicles.select(columns)):
-            one, other = (f"{r.flows}, seed {r.summary['seed']}" for r in (runs[0], run))
             raise CorampError(
-                f"--against: other vehicles arrive there ({one}; {other}); allowed are runs of the "
-                "same flows, seed and horizon"
+                f"--against: other vehicles arrive there ({_other_arrivals(runs[0], run)}); "
+                "allowed are runs of the same flows, seed and horizon, or of the same list"
             )
+
+
+def _other_arrivals(here: RunRecords, there: RunRecords) -> str:
+    """What two runs whose arrivals differ do not share: what was asked, or else who comes when."""
+    one, other = (
+        (
+            r.flows,
+            f"seed {r.summary['seed']}",
+            f"{r.scenario.simulation.horizon_s:g} s",
+            "listed" if r.scenario.arrivals else "drawn",
+            f"{r.vehicles.height} vehicles",
+        )
+        for r in (here, there)
+    )
+    differing = [(mine, its) for mine, its in zip(one, other, strict=True) if mine != its]
+    if differing:
+        return "; ".join(f"here {mine}, there {its}" for mine, its in differing)
+    due = [dict(r.vehicles.select("vehicle_id", "scheduled_s").iter_rows()) for r in (here, there)]
+    name = min(name for name in due[0] if due[0][name] != due[1].get(name))
+    its_s = f"there at {due[1][name]:g} s" if name in due[1] else "there never"
+    return f"such as {name}: here due at {due[0][name]:g} s, {its_s}"
 
 
 def _frame(kind: str, runs: Sequence[RunRecords]) -> Row:
@@ -81,11 +101,19 @@ def asked_table(run: RunRecords) -> Table:
         ("ramp", f"{-ramp.start_m:g} m, {ramp.speed_mps:g} m/s, at {ramp.merge_angle_deg:g}°"),
         ("acceleration lane", f"{ramp.acceleration_lane_m:g} m"),
         ("flow, mainline + ramp", run.flows),
-        ("arrivals", f"{scenario.simulation.horizon_s:g} s, seed {run.summary['seed']}"),
+        ("arrivals", _arrivals(run)),
         ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
         ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
     )
     return Table("What was computed", ("what", "value"), rows)
+
+
+def _arrivals(run: RunRecords) -> str:
+    listed = [arrival.stream for arrival in run.scenario.arrivals]
+    over = f"{run.scenario.simulation.horizon_s:g} s, seed {run.summary['seed']}"
+    if not listed:
+        return over
+    return f"listed, {listed.count('mainline')} + {listed.count('ramp')} vehicles in {over}"
 
 
 def _errors(positioning_error_m: float, run: RunRecords) -> str:
@@ -190,11 +218,17 @@ def comparison_table(runs: Sequence[RunRecords]) -> Table:
 
 
 def _how_sure(runs: Sequence[RunRecords]) -> list[str]:
+    one_draw = (
+        f"This is one seed ({runs[0].summary['seed']}), one draw of arrivals and entry speeds: "
+        "it has no interval. A study of several seeds gives one (coramp study)."
+    )
+    if runs[0].scenario.arrivals:
+        one_draw = (
+            "Arrivals are listed: another seed changes drivers alone, and nothing where all "
+            "cooperate. There is no interval over other arrivals."
+        )
     return [
-        (
-            f"This is one seed ({runs[0].summary['seed']}), one draw of arrivals and entry speeds: "
-            "it has no interval. A study of several seeds gives one (coramp study)."
-        ),
+        one_draw,
         (
             "Within the run the figures are exact for what was driven: delays, fuel and margins "
             "come from pieces of constant acceleration in closed form."

@@ -81,7 +81,7 @@ def road_data(scenario: Scenario) -> Row:
         "lane_m": scenario.ramp.acceleration_lane_m,
         "lane_width_m": LANE_WIDTH_M,
         "merge_angle_deg": scenario.ramp.merge_angle_deg,
-        "decision_m": scenario.ramp.decision_station_m,
+        "decision_m": scenario.decision_station_m,
         "v0_mps": scenario.mainline.speed_mps,
     }
 

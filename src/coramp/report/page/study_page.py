@@ -6,11 +6,8 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.records.files import read_json
 from coramp.records.run import RunRecords
-from coramp.records.run_folder import check_version
-from coramp.records.schemas import RESULT_VERSION, RUNS, Row
-from coramp.records.stored_checks import checked_frame
+from coramp.records.schemas import Row
 from coramp.report.baseline_figure import baseline_figure
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
@@ -21,8 +18,9 @@ from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
-from coramp.report.study_folder import checked_study
+from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
+from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.shown import (
     SHOWN_DRIVERS,
@@ -33,7 +31,6 @@ from coramp.studies.shown import (
     shown_rows,
 )
 from coramp.studies.statistics import estimate
-from coramp.studies.store import MARK, Store
 from coramp.studies.summary import promises, summary_tables
 from coramp.studies.tables import Table, with_interval
 
@@ -59,9 +56,8 @@ def study_page(folder: Path) -> str:
     The runs that can be watched are those of which the study has kept records. Raises CorampError
     where there is no study, or none of its runs went well.
     """
-    content = _content(folder)
-    study = checked_study(folder / MARK, content)
-    runs = _runs(folder, study)
+    content = study_content(folder)
+    study, runs = stored_runs(folder)
     good = runs.filter(status="ok")
     if good.is_empty():
         reason = f": {runs['error'][0]}" if runs.height else ""
@@ -71,44 +67,32 @@ def study_page(folder: Path) -> str:
         "study.html",
         title=f"Report: study {study.name}",
         subtitle=study.description,
-        asked=_asked(study, good),
+        asked=_asked(study, good, listed=_lists_arrivals(content)),
         answer=_answer(good),
-        notes=[*_notes(study, runs), *said],
+        notes=[*_notes(study, runs, listed=_lists_arrivals(content)), *said],
         tables=summary_tables(study, runs),
         pictures=pictures_of(study.layout, good),
         failed=_failed(runs),
-        sure=_how_sure(good),
+        sure=_how_sure(good, listed=_lists_arrivals(content)),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
-        repeat=f"coramp study {study.name} --seeds {good['seed'].n_unique()}",
+        repeat=f"coramp study {_file_of(study)} --seeds {good['seed'].n_unique()}",
         runs=packs,
         cells=cells,
     )
 
 
-def _content(folder: Path) -> Row:
-    content = read_json(folder / MARK)
-    if not isinstance(content, dict) or content.get("kind") != "study":
-        raise CorampError(f"{folder / MARK}: does not describe a study; give another folder")
-    check_version(folder, content)
-    if content.get("result_version") != RESULT_VERSION:
-        raise CorampError(
-            f"{folder}: was written by an older coramp; run its study again in another folder"
-        )
-    return content
+def _file_of(study: Study) -> str:
+    """The study as the command takes it; one of one's own is taken to lie in NAME.toml."""
+    return study.name if study.name in builtin_names("studies") else f"{study.name}.toml"
 
 
-def _runs(folder: Path, study: Study) -> pl.DataFrame:
-    path = folder / "runs.parquet"
-    if not path.exists():
-        store = Store(folder, study)
-        return store.frames(store.everything())[0]
-    try:
-        return checked_frame(path, pl.read_parquet(path), RUNS)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise CorampError(f"{path}: cannot be read: {error}; run the study again") from error
+def _lists_arrivals(content: Row) -> bool:
+    """Whether the study's scenario lists its arrivals."""
+    scenario = content.get("scenario")
+    return isinstance(scenario, dict) and bool(scenario.get("arrivals"))
 
 
-def _asked(study: Study, good: pl.DataFrame) -> Table:
+def _asked(study: Study, good: pl.DataFrame, *, listed: bool) -> Table:
     flows = good.select("mainline_veh_h", "ramp_veh_h").unique().sort(pl.all())
     pairs = [f"{mainline:g} + {ramp:g}" for mainline, ramp in flows.iter_rows()]
     shown = ", ".join(pairs) if len(pairs) <= 12 else f"{pairs[0]} to {pairs[-1]} ({len(pairs)})"
@@ -116,7 +100,7 @@ def _asked(study: Study, good: pl.DataFrame) -> Table:
         ("study", f"{study.name}: {study.description}".rstrip(": ")),
         ("scenario", study.scenario),
         ("strategies", ", ".join(good["strategy"].unique(maintain_order=True))),
-        ("flows, mainline + ramp (veh/h)", shown),
+        ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
     )
@@ -154,9 +138,12 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _notes(study: Study, runs: pl.DataFrame) -> Iterator[str]:
+def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     seeds = int(runs["seed"].max())  # type: ignore[arg-type]
     asked = count_runs(study, seeds)
+    if listed:  # no seed changes what nobody drives, so each runs once
+        once = runs.filter(pl.col("drivers").is_null()).height
+        asked -= once * (seeds - 1)
     if runs.height < asked:
         most = "at most " if study.searches else ""
         yield f"{runs.height} of {most}{asked} runs with {seeds} seeds are done and reported here."
@@ -180,15 +167,22 @@ def _cell(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _how_sure(good: pl.DataFrame) -> list[str]:
+def _how_sure(good: pl.DataFrame, *, listed: bool) -> list[str]:
     kept = promises(good)
     seeds = good["seed"].n_unique()
     alone = " One seed has none; run more (--seeds 10)." if seeds == 1 else ""
-    return [
-        (
+    if listed:
+        means = (
+            "Arrivals are listed: a seed changes drivers alone, and a cooperative run is the same "
+            "with every seed. It runs once, so that it has no interval."
+        )
+    else:
+        means = (
             f"Means are over {seeds} seeds, each one draw of arrivals and entry speeds, the same "
             f"for every strategy; ± is a 95 % interval of the mean by Student's t.{alone}"
-        ),
+        )
+    return [
+        means,
         "What the cooperative runs promised: "
         + "; ".join(f"{what}: {value}" for what, value in kept.rows)
         + ".",

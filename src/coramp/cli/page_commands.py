@@ -1,0 +1,119 @@
+"""Commands that tell and show what was computed: explain, report, replay, studio, figures."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coramp.cli.options import Json, ScenarioName, Wide
+
+showing = typer.Typer(rich_markup_mode=None)
+
+
+@showing.command(epilog="Example: coramp explain out/r r00012")
+def explain(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
+    vehicle: Annotated[str, typer.Argument(help="A vehicle's id, such as r00012.")],
+    json: Json = False,
+    wide: Wide = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw the decision: road and time-space diagram (png, svg or pdf)."),
+    ] = None,
+) -> None:
+    """Tell one vehicle's story: why it got its plan, in numbers."""
+    from coramp.cli.console import print_json, print_story, story_json
+    from coramp.explain.story import story_in
+    from coramp.records.run_folder import read_run
+
+    run = read_run(folder)
+    story = story_in(run, vehicle, folder)
+    if plot is not None:
+        from coramp.report.story_figure import save_story_figure
+
+        save_story_figure(run, vehicle, plot)
+    if json:
+        print_json(story_json(story))
+    else:
+        print_story(story, wide)
+
+
+@showing.command(epilog="Example: coramp report out/r --against out/u")
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of a run or a study.")],
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, to stand beside it."),
+    ] = None,
+) -> None:
+    """Write DIR/report.html, one file that needs no network."""
+    from coramp.cli.console import written
+    from coramp.report.writing import report as write_report
+
+    written(write_report(folder, against))
+
+
+@showing.command(epilog="Example: coramp replay out/r --against out/u")
+def replay(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, to be seen beside it."),
+    ] = None,
+) -> None:
+    """Write DIR/replay.html: the merge from above, to be played."""
+    from coramp.cli.console import written
+    from coramp.report.writing import replay as write_replay
+
+    written(write_replay(folder, against))
+
+
+@showing.command(epilog="Example: coramp studio my-ramp.toml --port 8650 --open")
+def studio(
+    scenario: ScenarioName = "paper",
+    port: Annotated[int, typer.Option(help="Port on this machine; 0 takes any.")] = 8642,
+    show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+) -> None:
+    """Play with a scenario: a local page with sliders."""
+    from coramp.cli.console import serving, tell_of_compiling
+    from coramp.studio.server import serve
+
+    tell_of_compiling()
+    serve(scenario, port, lambda address: serving(address, show))
+
+
+@showing.command(epilog="Example: coramp figures --seeds 10 --study out/capacity --out out/figures")
+def figures(
+    out: Annotated[
+        Path, typer.Option(help="Folder for the figures; runs are kept in its study/.")
+    ] = Path("out/figures"),
+    seeds: Annotated[int, typer.Option(help="Seeds 1 to N of what is run for them.")] = 3,
+    jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
+    studies: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--study",
+            metavar="FOLDER",
+            help="Draw this finished study too (capacity), or in place of a run of "
+            "its own (paper, sensitivity).",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw the paper's figures and ours, as SVG and PNG."""
+    from coramp.api import figures as draw_figures
+    from coramp.cli.console import (
+        figures_json,
+        print_figures,
+        print_json,
+        tell_of_compiling,
+    )
+    from coramp.cli.study_progress import StudyProgress
+
+    tell_of_compiling()
+    with StudyProgress() as progress:
+        result = draw_figures(out, seeds=seeds, jobs=jobs, studies=studies or (), progress=progress)
+    if json:
+        print_json(figures_json(result))
+    else:
+        print_figures(result)

@@ -1,0 +1,106 @@
+"""A scenario of one's own as it is taken: every key, and which of them were chosen for it."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from coramp.scenarios.checks import decision_station_range_m
+from coramp.scenarios.defaults import populations
+from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.speeds_kmh import KMH_PER_MPS, data_in_mps
+from coramp.scenarios.toml_files import override_text, read
+
+STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
+TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation")
+CHOSEN, DEFAULT = "chosen to suit the rest", "default"
+
+
+class Taken(NamedTuple):
+    """A key of a scenario as it is taken: its value, and why where the file does not give it."""
+
+    key: str
+    value: Any
+    why: str | None
+
+
+def taken(name: str) -> tuple[Scenario, list[Taken]]:
+    """Returns the scenario of a file, and every key of its tables that hold one value each.
+
+    Raises CorampError where the file is not valid.
+    """
+    scenario = load_scenario(name)
+    data, _ = data_in_mps(read("scenarios", name)[1], name)
+    return scenario, list(_keys(scenario, data))
+
+
+def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
+    for table in TABLES:
+        given = data.get(table, {})
+        model = getattr(scenario, table)
+        for key, field in type(model).model_fields.items():
+            value = getattr(model, key)
+            if key in given:
+                why = None
+            elif table == "ramp" and key in STATIONS:
+                value, why = getattr(scenario, key), _why_there(scenario, key)
+            elif table == "motion" and key == "slow_deviation":
+                value, why = scenario.slow_deviation, CHOSEN
+            elif value is None:
+                continue
+            elif key == "flow_veh_h":
+                why = "of the list of arrivals"
+            else:
+                why = CHOSEN if field.is_required() else DEFAULT
+            yield Taken(f"{table}.{key}", value, why)
+
+
+def _why_there(scenario: Scenario, key: str) -> str:
+    if key != "decision_station_m":
+        return CHOSEN
+    first_m, last_m = decision_station_range_m(scenario)
+    return f"{CHOSEN}: possible is {first_m:.1f} to {last_m:.1f}"
+
+
+def as_toml(name: str) -> str:
+    """Returns a scenario of one's own with all that was chosen for it, as TOML with comments.
+
+    Populations of drivers that every scenario has are named only, and so are listed arrivals.
+    """
+    scenario, keys = taken(name)
+    lines = [
+        f"# {name} as coramp takes it. What the file leaves out says why it is as it is.",
+        f"name = {_text(scenario.name)}",
+    ]
+    table = ""
+    for key, value, why in keys:
+        here, _, plain = key.partition(".")
+        if here != table:
+            table = here
+            lines += ["", f"[{table}]"]
+        notes = [note for note in (_in_kmh(plain, value), why) if note]
+        commented = "# " if plain == "flow_veh_h" and scenario.arrivals else ""
+        comment = f"  # {', '.join(notes)}" if notes else ""
+        lines.append(f"{commented}{plain} = {_text(value)}{comment}")
+    common = [n for n in scenario.drivers if n in populations()]
+    own = [n for n in scenario.drivers if n not in populations()]
+    lines += ["", "# Drivers that every scenario has; coramp scenarios paper shows them:"]
+    lines += [f"#   {name}" for name in common]
+    if own:
+        lines.append(f"# drivers of its own: {', '.join(own)}")
+    if scenario.arrivals:
+        lines.append(f"# [[arrivals]]: {len(scenario.arrivals)} vehicles, listed in the file")
+    return "\n".join(lines) + "\n"
+
+
+def _in_kmh(key: str, value: Any) -> str:
+    if not key.endswith("_mps"):
+        return ""
+    values = value if isinstance(value, tuple) else (value,)
+    return f"{' to '.join(f'{v * KMH_PER_MPS:.4g}' for v in values)} km/h"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)  # quotes that override_text may leave out
+    return override_text("", value).removeprefix("=")

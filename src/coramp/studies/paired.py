@@ -1,0 +1,186 @@
+"""Differences between runs on the same arrivals, seed by seed, with their intervals.
+
+What two strategies lose differs much less from seed to seed than what each loses: both meet the
+same vehicles. So the interval of the difference says more than those of the two means.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import combinations
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import polars as pl
+
+from coramp.studies.overrides import overrides_of
+from coramp.studies.statistics import Estimate, estimate
+from coramp.studies.tables import Table, with_interval
+
+DELAYS = ("delay_s", "mainline_delay_s", "ramp_delay_s")
+WITHOUT_ARRIVALS = ("safety.", "motion.", "strategy.", "drivers.")
+"""Tables of a scenario that say nothing of who arrives."""
+WITHOUT_ARRIVALS_KEYS = frozenset(
+    {"control.actuation_delay_s", "control.retry_s", "control.gap_position"}
+    | {"control.gap_creation_start", "simulation.drain_s"}
+    | {f"ramp.{key}_station_m" for key in ("decision", "stop", "detector", "signal")}
+    | {"ramp.acceleration_lane_m", "ramp.merge_angle_deg"}
+)
+EVERY_PAIR_OF = 3
+"""Of more strategies, or settings, only the pairs with the one that loses least are told."""
+
+
+class Cell(NamedTuple):
+    """What was run with several seeds at one flow: who decides, and what was set."""
+
+    strategy: str
+    drivers: str | None
+    overrides: str | None
+
+    @property
+    def who(self) -> tuple[str, str | None]:
+        """Strategy and drivers."""
+        return self.strategy, self.drivers
+
+    @property
+    def name(self) -> str:
+        """Strategy, drivers and settings in words."""
+        who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
+        return f"{who}, {self.overrides}" if self.overrides else who
+
+
+class Difference(NamedTuple):
+    """How much less (s) one cell loses than another on the same arrivals, by seed.
+
+    ``by_s`` has the delay of all, of the mainline and of the ramp; positive where ``less`` loses
+    less.
+    """
+
+    scenario: str
+    flow: tuple[float, float]
+    less: Cell
+    more: Cell
+    by_s: tuple[Estimate, Estimate, Estimate]
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether the interval of the difference of all leaves out zero."""
+        mean, half_width, _ = self.by_s[0]
+        return not math.isnan(half_width) and abs(mean) > half_width
+
+
+Delays = Mapping[Cell, Mapping[int, tuple[float | None, ...]]]
+
+
+def differences(good: pl.DataFrame) -> list[Difference]:
+    """Returns the difference of every two cells with the same arrivals that differ in one thing.
+
+    That is the strategy (or its drivers), or what is set and says nothing of arrivals. Cells that
+    lose the same with every seed are left out, and so is what fewer than two seeds share.
+    """
+    return [
+        difference
+        for (scenario, flow, _), cells in _by_arrivals(good).items()
+        for one, other in _pairs(cells)
+        if (difference := _difference(scenario, flow, (one, other), cells)) is not None
+    ]
+
+
+def _pairs(cells: Delays) -> Iterator[tuple[Cell, Cell]]:
+    """Cells that differ in one thing: who decides, setting by setting, then what was set."""
+    for fixed in (attrgetter("overrides"), attrgetter("who")):
+        groups: dict[Any, list[Cell]] = {}
+        for cell in cells:
+            groups.setdefault(fixed(cell), []).append(cell)
+        for group in groups.values():
+            best = min(group, key=lambda cell: _mean(cells[cell]))
+            few = len(group) <= EVERY_PAIR_OF
+            yield from (pair for pair in combinations(group, 2) if few or best in pair)
+
+
+def _by_arrivals(
+    good: pl.DataFrame,
+) -> dict[tuple[str, tuple[float, float], str], dict[Cell, dict[int, tuple[float | None, ...]]]]:
+    groups: dict[Any, dict[Cell, dict[int, tuple[float | None, ...]]]] = {}
+    for row in good.iter_rows(named=True):
+        arrivals = {k: v for k, v in overrides_of(row).items() if not _says_nothing_of_arrivals(k)}
+        flow = row["mainline_veh_h"], row["ramp_veh_h"]
+        cell = Cell(row["strategy"], row["drivers"], row["overrides"])
+        by_seed = groups.setdefault((row["scenario"], flow, str(arrivals)), {}).setdefault(cell, {})
+        by_seed[row["seed"]] = tuple(row[name] for name in DELAYS)
+    return groups
+
+
+def _says_nothing_of_arrivals(key: str) -> bool:
+    return key.startswith(WITHOUT_ARRIVALS) or key in WITHOUT_ARRIVALS_KEYS
+
+
+def _difference(
+    scenario: str, flow: tuple[float, float], pair: tuple[Cell, Cell], cells: Delays
+) -> Difference | None:
+    one, other = pair
+    seeds = sorted(cells[one].keys() & cells[other].keys())
+    found = [(cells[one][seed], cells[other][seed]) for seed in seeds]
+    if len(found) < 2 or all(first == second for first, second in found):
+        return None
+    by_s = _estimates((second, first) for first, second in found)
+    if by_s[0].mean < 0.0:
+        return Difference(scenario, flow, other, one, _estimates(found))
+    return Difference(scenario, flow, one, other, by_s)
+
+
+def _estimates(
+    pairs: Iterable[tuple[tuple[float | None, ...], tuple[float | None, ...]]],
+) -> tuple[Estimate, Estimate, Estimate]:
+    """Estimates of the first of each pair less its second, of all, mainline and ramp."""
+    given = list(pairs)
+    all_s, mainline_s, ramp_s = (
+        estimate(
+            [
+                a[k] - b[k]  # type: ignore[operator]
+                for a, b in given
+                if a[k] is not None and b[k] is not None
+            ]
+        )
+        for k in range(len(DELAYS))
+    )
+    return all_s, mainline_s, ramp_s
+
+
+def _mean(by_seed: Mapping[int, tuple[float | None, ...]]) -> float:
+    return estimate([values[0] for values in by_seed.values() if values[0] is not None]).mean
+
+
+def paired_table(good: pl.DataFrame) -> Table | None:
+    """Returns the differences as a table, None where no two cells have the same arrivals."""
+    found = differences(good)
+    if not found:
+        return None
+    rows = tuple(
+        (
+            d.scenario,
+            f"{d.flow[0]:g} + {d.flow[1]:g}",
+            d.less.name,
+            d.more.name,
+            *map(with_interval, d.by_s),
+            "yes" if d.told_apart else "no",
+            str(d.by_s[0].values),
+        )
+        for d in found
+    )
+    columns = (
+        "scenario",
+        "flow (veh/h)",
+        "loses less",
+        "than",
+        "by, all (s)",
+        "by, mainline (s)",
+        "by, ramp (s)",
+        "sure",
+        "seeds",
+    )
+    note = (
+        "Means over seeds of the difference on the same arrivals, with 95 % intervals; sure: the "
+        "interval of all leaves out zero."
+    )
+    important = ("loses less", "than", "by, all (s)", "sure", "flow (veh/h)")
+    return Table("Differences on the same arrivals", columns, rows, (note,), important)
