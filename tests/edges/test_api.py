@@ -11,6 +11,7 @@ import pytest
 import coramp
 import coramp.api
 from coramp.records.schemas import (
+    ATTEMPTS,
     DECISIONS,
     MEASURED,
     RUNS,
@@ -29,6 +30,7 @@ SCHEMAS = {
     "decisions": DECISIONS,
     "positions": TRAJECTORIES,
     "violations": VIOLATIONS,
+    "attempts": ATTEMPTS,
 }
 
 
