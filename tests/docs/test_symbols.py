@@ -39,6 +39,7 @@ FILES = {
     "types.parquet": schemas.TYPES,
     "trajectories.parquet": schemas.TRAJECTORIES,
     "decisions.parquet": schemas.DECISIONS,
+    "attempts.parquet": schemas.ATTEMPTS,
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
     "streams.parquet": schemas.STREAMS,
