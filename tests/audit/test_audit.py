@@ -18,7 +18,7 @@ from tests.edges import invoke
 
 COOPERATIVE = [name for name, strategy in strategies().items() if strategy.cooperative]
 STEP_S = 0.1
-CLAIMS = 27
+CLAIMS = 28
 SHORT = {"mainline_veh_h": 1500, "ramp_veh_h": 600, "horizon_s": 40, "keep_messages": True}
 
 
@@ -286,6 +286,7 @@ def test_a_figure_that_is_not_so_is_named(kept, tmp_path, name, value):
         ("vehicles", "exit_s"),
         ("trajectories", "station_m"),
         ("decisions", "merge_time_s"),
+        ("attempts", "missing_m"),
     ],
 )
 def test_a_table_that_is_not_so_is_named(kept, tmp_path, table, name):
@@ -294,10 +295,18 @@ def test_a_table_that_is_not_so_is_named(kept, tmp_path, table, name):
     frame = pl.read_parquet(path)
     here = pl.int_range(pl.len()) == frame.height // 2
     frame.with_columns(
-        pl.when(here).then(pl.col(name) + 1.0).otherwise(name).alias(name)
+        pl.when(here).then(pl.col(name).fill_null(0.0) + 1.0).otherwise(name).alias(name)
     ).write_parquet(path)
     (found,) = audit(tmp_path / "r").contradictions
     assert found.against == f"{table}.parquet"
+
+
+def test_what_was_tried_is_not_confirmed_where_it_is_missing(kept, tmp_path):
+    shutil.copytree(kept.folder, tmp_path / "r")
+    (tmp_path / "r" / "attempts.parquet").unlink()
+    result = audit(tmp_path / "r")
+    assert verdicts(result)["attempts.parquet"] == UNCHECKED
+    assert result.holds
 
 
 def test_the_command_says_so_in_a_table_and_by_its_exit_code(kept, tmp_path):

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from coramp.equations.printed import EQUATIONS as EQUATIONS_AS_PRINTED
 from tests.mathematics import mathematics
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "equations.md"
+ERRATA = PAGE.parents[1] / "errata.md"
 EQUATIONS = 48
+ROW = re.compile(r"\| (\d+) \| (.+?) \| ((?:[^|\\]|\\\|)+) \| (.+) \|$")
 LINK = re.compile(r"\[`([\w.]+)`\]\(([\w-]+\.md)#(coramp\.[\w.]+)\)")
 
 
@@ -18,10 +21,20 @@ def rows():
     """Returns the page's table: by equation, the links to its functions."""
     found = {}
     for line in PAGE.read_text(encoding="utf-8").splitlines():
-        if cells := re.match(r"\| (\d+) \| (.+) \| (.+) \|$", line):
+        if cells := ROW.match(line):
             assert int(cells[1]) not in found
-            found[int(cells[1])] = LINK.findall(cells[3])
+            found[int(cells[1])] = LINK.findall(cells[4])
     return found
+
+
+def told():
+    """Returns what the page's table says of each equation: what it gives, and its printed form."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    matches = [found for line in lines if (found := ROW.match(line))]
+    return {
+        int(cells[1]): (cells[2], cells[3].replace("\\|", "|").replace("`", ""))
+        for cells in matches
+    }
 
 
 ROWS = rows()
@@ -64,6 +77,20 @@ def test_citations_are_read():
     assert numbers("(Eq. 23; Eq. 33 for t_2')") == {23, 33}
     assert numbers("(Eq. 22; 32 for a_r')") == {22, 32}
     assert numbers("nothing of 5 vehicles") == set()
+
+
+def test_the_page_has_the_printed_forms_that_explanations_show():
+    shown = told()
+    for number, equation in EQUATIONS_AS_PRINTED.items():
+        read_as = f"; read: {equation.read_as}" if equation.read_as else ""
+        assert shown[number] == (equation.gives, equation.printed + read_as)
+
+
+def test_every_misprint_is_in_the_errata():
+    errata = ERRATA.read_text(encoding="utf-8")
+    misread = {n for n, e in EQUATIONS_AS_PRINTED.items() if e.read_as}
+    assert misread == {n for n in misread if f"({n})" in errata}
+    assert {27, 28, 29, 31, 33, 39, 48} <= misread
 
 
 def test_every_equation_has_its_row_in_order():

@@ -40,6 +40,7 @@ FILES = {
     "types.parquet": schemas.TYPES,
     "trajectories.parquet": schemas.TRAJECTORIES,
     "decisions.parquet": schemas.DECISIONS,
+    "attempts.parquet": schemas.ATTEMPTS,
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
     "streams.parquet": schemas.STREAMS,

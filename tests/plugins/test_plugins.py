@@ -17,6 +17,7 @@ from coramp.cli.skeleton import write_skeleton
 from coramp.coordination.guard import Guarded
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
+from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
     Decision,
     DriveWithAcceleration,
@@ -128,6 +129,28 @@ def explaining_without_numbers(decide):
     return Decision(decide.commands, explanations=(story,))
 
 
+def telling_of_attempts(decide, **changes):
+    tried = [Attempt("free"), Attempt("reach")._replace(**changes)]
+    story = decide.explanations[0]._replace(tried=tried)
+    return Decision(decide.commands, explanations=(story,))
+
+
+def trying_by_magic(decide):
+    return telling_of_attempts(decide, rung="magic")
+
+
+def trying_between_nobody(decide):
+    return telling_of_attempts(decide, front_row=9999)
+
+
+def trying_without_numbers(decide):
+    return telling_of_attempts(decide, missing_m=None)
+
+
+def trying_without_a_reason(decide):
+    return telling_of_attempts(decide, reason=3)
+
+
 def answering_nothing(_):
     return None
 
@@ -168,6 +191,10 @@ MISTAKES = [
     (explaining_by_magic, "explains itself by rung 'magic'; allowed are free, reach"),
     (explaining_by_nobody, "commands an unknown vehicle, row 9999"),
     (explaining_without_numbers, "returns what is no decision"),
+    (trying_by_magic, "tells of an attempt by rung 'magic'; allowed are free, reach"),
+    (trying_between_nobody, "commands an unknown vehicle, row 9999"),
+    (trying_without_numbers, "returns what is no decision"),
+    (trying_without_a_reason, "of what it tried; allowed are Attempts"),
     (answering_nothing, "returns NoneType; allowed is a Decision"),
     (remembering_a_list, "has a memory that is not hashable"),
     (waking_in_the_past, "asks to be woken at -1.0 s"),

@@ -7,7 +7,7 @@ from coramp._kernel import FloatArray
 from coramp.audit.inputs import Inputs, orders_of
 from coramp.audit.orders import Orders
 from coramp.audit.replay import Replayed, replayed, replayed_signals, requests_in
-from coramp.audit.verdicts import Check, Finding, finding, judged
+from coramp.audit.verdicts import UNCHECKED, Check, Finding, finding, judged
 from coramp.coordination.guard import strategy_to_run
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
@@ -226,9 +226,9 @@ def check_records(inputs: Inputs, again: Replayed) -> list[Check]:
 
 
 def _check_attempts(told: pl.DataFrame | None, due: pl.DataFrame) -> list[Check]:
-    """Compares what was tried; a run of a coramp that kept no attempts has nothing to compare."""
+    """Compares what was tried; it says so where the folder does not tell."""
     if told is None:
-        return []
+        return [Check("attempts.parquet", UNCHECKED, "is missing, as in runs of an older coramp")]
     findings = []
     if not told.equals(due):
         findings.append(Finding("attempts.parquet", _first_other(told, due, "attempt")))
