@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp.cli.table_text import text_lines
-from coramp.cli.table_view import fitted, is_number, numeric_columns
+from coramp.cli.table_view import fitted
 from coramp.studies.summary import overview
-from coramp.studies.tables import Table
+from coramp.studies.tables import Table, is_number
 from tests.edges import invoke
 from tests.study import overridden, run_row, runs_of
 
@@ -83,7 +83,7 @@ def test_elsewhere_a_row_is_one_line_with_its_cells(table):
 
 def test_numbers_stand_to_the_right():
     table = Table("T", ("what", "value"), (("a", "1.5"), ("b", "12.25"), ("c", "-")))
-    assert numeric_columns(table) == [False, True]
+    assert table.numeric == [False, True]
     assert lines_of(table)[4:] == [" a       1.5", " b     12.25", " c         -"]
     assert not is_number("free 2, reach 5")
     assert not is_number("1.2 m")

@@ -61,9 +61,7 @@ def test_every_attempt_of_a_decision_is_in_a_line(folders, name):
         told = invoke("explain", folders / name, vehicle_id)
         assert (told.code, told.err) == (0, "")
         for chapter in story.chapters:
-            attempts = run.attempts.filter(
-                vehicle_id=vehicle_id, time_s=chapter.decision["time_s"]
-            )
+            attempts = run.attempts.filter(vehicle_id=vehicle_id, time_s=chapter.decision["time_s"])
             assert numbers_in(chapter.tried) == attempts["attempt"].to_list()
             chosen = [line for line in chapter.tried if ": chosen" in line]
             assert len(chosen) == (chapter.decision["rung"] != "hold")

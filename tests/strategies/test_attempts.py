@@ -231,9 +231,7 @@ def test_a_slot_that_is_too_late_says_by_how_far():
     # the one behind the claim merges just now and cannot fall back, and those behind it leave no
     # room for 130 m, more than the 100 m of 5 s
     merge_m = FREE_MERGE_M - 20.0 * (FREE_MERGE_S + 8.75)
-    stream = [
-        (pieces(0.0, merge_m + 1.0 - 6.0 * k, 20.0), STREAM if k else 0.2) for k in range(22)
-    ]
+    stream = [(pieces(0.0, merge_m + 1.0 - 6.0 * k, 20.0), STREAM if k else 0.2) for k in range(22)]
     fleet = fleet_of((pieces(0.0, -300.0, 16.0), math.inf), *stream)
     claim_s = -(merge_m + 2.0) / 20.0
     plan, proposal, _, _ = plan_onto_lane(fleet, 0, 0.0, claim_s, True, 0.0, packed(RULES))

@@ -82,15 +82,18 @@ errors = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 0.5), st.floats(0.0, 3.0)
 
 
 @given(front=errors, rear=errors, v_front=speeds, v_rear=speeds, still_m=st.floats(0.0, 3.0))
-def test_each_ones_own_errors_count_and_the_followers_time_gap(front, rear, v_front, v_rear, still_m):
+def test_each_ones_own_errors_count_and_the_followers_time_gap(
+    front, rear, v_front, v_rear, still_m
+):
     budget = SAFETY._replace(standstill_gap_m=still_m)
     rows = [
-        sized(5.0, positioning_error_m=p, clock_error_s=c, time_gap_s=g) for p, c, g in (front, rear)
+        sized(5.0, positioning_error_m=p, clock_error_s=c, time_gap_s=g)
+        for p, c, g in (front, rear)
     ]
     closing_km_h = 3.6 * max(0.0, v_rear - v_front)
-    expected = (
-        front[0] + rear[0] + front[1] * v_front + rear[1] * v_rear + rear[2] * v_rear
-    ) + (closing_km_h**2 / (254.0 * 0.51) + still_m)
+    expected = (front[0] + rear[0] + front[1] * v_front + rear[1] * v_rear + rear[2] * v_rear) + (
+        closing_km_h**2 / (254.0 * 0.51) + still_m
+    )
     assert safe_distance_m(v_front, v_rear, pair_safety(*rows, budget)) == pytest.approx(
         expected, rel=1e-12, abs=1e-12
     )

@@ -38,19 +38,20 @@ def explain(
         print_story(story, wide)
 
 
-@showing.command(epilog="Example: coramp report out/r --against out/u")
+@showing.command(epilog="Example: coramp report out/r --against out/u --kmh")
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of a run or a study.")],
     against: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Another run on the same arrivals, to stand beside it."),
     ] = None,
+    kmh: Annotated[bool, typer.Option("--kmh", help="Show speeds in km/h.")] = False,
 ) -> None:
     """Write DIR/report.html, one file that needs no network."""
     from coramp.cli.console import written
     from coramp.report.writing import report as write_report
 
-    written(write_report(folder, against))
+    written(write_report(folder, against, kmh=kmh))
 
 
 @showing.command(epilog="Example: coramp replay out/r --against out/u")

@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from coramp.cli.table_view import BETWEEN, MARGINS, least_widths, numeric_columns
+from coramp.cli.table_view import BETWEEN, MARGINS, least_widths
 from coramp.studies.tables import Table
 
 RULE = "─"
@@ -12,7 +12,7 @@ RULE = "─"
 def text_lines(table: Table, width: int | None) -> list[str]:
     """Returns a table's lines: title, header, rows and notes; without a width nothing wraps."""
     widths = _widths(table, width)
-    numeric = numeric_columns(table)
+    numeric = table.numeric
     lines = [table.title, "", *_row_lines(table.columns, widths, numeric)]
     lines.append(" " + RULE * (sum(widths) + BETWEEN * (len(widths) - 1)))
     for row in table.rows:

@@ -1,37 +1,20 @@
 """How much of a table 80 columns hold, in whole words and numbers."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coramp.studies.tables import Table
+from coramp.studies.tables import Table, is_number
 
 NARROW = 80
 """Characters that a terminal is sure to have."""
 BETWEEN, MARGINS = 2, 2
 """Characters between columns, and beside the first and last."""
-NUMBER = re.compile(r"[-+]?\d[\d.,]*(e[-+]?\d+)?%?|[-+]?inf")
-SIGNS = frozenset("-+±%/")
-
-
-def is_number(cell: str) -> bool:
-    """Returns whether a cell is a number, a sum or an interval, which is never broken."""
-    return all(word in SIGNS or NUMBER.fullmatch(word) for word in cell.split())
 
 
 def _is_quantity(cell: str) -> bool:
     """Whether a cell is a number with one word behind it, such as a unit."""
     *amount, unit = cell.split() or [""]
     return bool(amount) and is_number(" ".join(amount)) and len(unit) < len("vehicles ")
-
-
-def numeric_columns(table: Table) -> list[bool]:
-    """Returns of each column whether all of its cells are numbers, and some are no dash."""
-    columns = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
-    return [
-        all(map(is_number, cells)) and any(cell not in ("-", "") for cell in cells)
-        for cells in columns
-    ]
 
 
 def least_widths(table: Table) -> list[int]:

@@ -62,6 +62,22 @@ def dimensions(runs: Sequence[Varied]) -> list[str]:
     return [*found, *([STRATEGY] if len({run.who for run in runs}) > 1 else [])]
 
 
+def readable(good: pl.DataFrame) -> str | None:
+    """Returns over what the figure of a study has few enough rows, None where over nothing."""
+    runs = varied(good)
+    names = dimensions(runs) or [FLOW]
+    return next((n for n in names if len(_panels(runs, _others(names, n))) <= MOST_PANELS), None)
+
+
+def _others(names: Sequence[str], over: str) -> list[str]:
+    return [name for name in names if name not in (over, STRATEGY)]
+
+
+def _panels(runs: Sequence[Varied], others: Sequence[str]) -> list[tuple[Any, ...]]:
+    """What else varies, in order, a row of diagrams each."""
+    return sorted({tuple(run.values[n] for n in others) for run in runs}, key=_order)
+
+
 def varied_figure(good: pl.DataFrame, over: str | None = None) -> Figure:
     """Returns mean delay (s) over what varies, with 95 % intervals over seeds.
 
@@ -77,8 +93,8 @@ def varied_figure(good: pl.DataFrame, over: str | None = None) -> Figure:
     if over not in names and over not in (FLOW, STRATEGY):
         known = ", ".join(names) or "nothing: the study is one cell"
         raise CorampError(f"over: {over} does not vary; allowed are {known}")
-    others = [name for name in names if name not in (over, STRATEGY)]
-    panels = sorted({tuple(run.values[n] for n in others) for run in runs}, key=_order)
+    others = _others(names, over)
+    panels = _panels(runs, others)
     if len(panels) > MOST_PANELS:
         raise CorampError(
             f"over: {over} leaves {len(panels)} rows of {', '.join(others)}; allowed are "

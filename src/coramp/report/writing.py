@@ -11,6 +11,7 @@ from coramp.records.schemas import Row
 from coramp.report.page.pages import replay_page, run_page
 from coramp.report.page.study_page import study_page
 from coramp.scenarios.toml_files import builtin_names, override_text
+from coramp.studies.speed_unit import KMH, MPS
 from coramp.studies.store import MARK as STUDY_MARK
 
 HORIZON = "simulation.horizon_s"
@@ -19,19 +20,21 @@ HORIZON = "simulation.horizon_s"
 def report(
     folder: str | Path,
     against: str | Path | None = None,
+    *,
+    kmh: bool = False,
 ) -> Path:
     """Writes ``report.html`` into the folder of a run or a study and returns its path.
 
     One file that works without a network. ``against`` is the folder of another run on the same
-    arrivals, to be compared with a run. Raises CorampError where there is nothing to report, or
-    where files cannot be read or written.
+    arrivals, to stand beside a run. With ``kmh`` speeds are in km/h, else in m/s. Raises
+    CorampError where there is nothing to report, or that cannot be read or written.
     """
     place = Path(folder)
-    target = place / REPORT
+    target, unit = place / REPORT, KMH if kmh else MPS
     if (place / STUDY_MARK).exists():
         if against is not None:
             raise CorampError("--against: a study compares by itself; give it with a run only")
-        write_text(target, study_page(place))
+        write_text(target, study_page(place, unit))
         return target
     if not (place / MARK).exists():
         raise CorampError(
@@ -39,7 +42,7 @@ def report(
             "study has written"
         )
     stored = [read_run(Path(name)) for name in (place, against) if name is not None]
-    page = run_page(stored, stored[0].content["versions"], _repeat(stored))
+    page = run_page(stored, stored[0].content["versions"], _repeat(stored), unit)
     write_text(target, page)
     return target
 

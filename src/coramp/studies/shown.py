@@ -17,6 +17,7 @@ from coramp.records.staging import staged_folder
 from coramp.runs.running import RunSpec, make_spec, recorded
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.definition import Study
+from coramp.studies.overrides import overrides_of
 
 FOLDER = "shown"
 SHOWN_DRIVERS = ("fair", "paper")
@@ -39,7 +40,10 @@ def shared_flows(good: pl.DataFrame) -> list[tuple[float, float]]:
 
 
 def shown_rows(good: pl.DataFrame) -> list[Row]:
-    """Returns the rows of the runs that the report shows, in the order of the table."""
+    """Returns the rows of the runs that the report shows, in the order of the table.
+
+    They are those without overrides, or where every run has some, with the first that there are.
+    """
     if good.is_empty():
         return []
     flows = shared_flows(good)
@@ -47,12 +51,21 @@ def shown_rows(good: pl.DataFrame) -> list[Row]:
     for mainline, ramp in dict.fromkeys((flows[0], flows[-1])):
         at = plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
         at = at.filter(pl.col("seed") == pl.col("seed").min())
+        at = at.filter(pl.col("overrides").eq_missing(pl.lit(at["overrides"][0], pl.String)))
+        shown = _shown_drivers(at)
         rows += [
             row
             for row in at.unique(["strategy", "drivers"], maintain_order=True).rows(named=True)
-            if row["overrides"] is None and row["drivers"] in (None, *SHOWN_DRIVERS)
+            if row["drivers"] in (None, *shown)
         ]
     return rows
+
+
+def _shown_drivers(at: pl.DataFrame) -> tuple[str, ...]:
+    """The populations that are shown: the usual ones, or whatever there is."""
+    there = at["drivers"].drop_nulls().unique(maintain_order=True).to_list()
+    usual = tuple(name for name in SHOWN_DRIVERS if name in there)
+    return usual or tuple(there[: len(SHOWN_DRIVERS)])
 
 
 def keep_shown(
@@ -101,6 +114,8 @@ def _again(study: Study, row: Row) -> RunSpec:
         mainline_veh_h=None if listed else row["mainline_veh_h"],
         ramp_veh_h=None if listed else row["ramp_veh_h"],
         drivers=row["drivers"],
+        overrides=overrides_of(row),
         seed=row["seed"],
         horizon_s=study.horizon_s,
+        blamed="",
     )

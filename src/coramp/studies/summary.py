@@ -14,6 +14,7 @@ from coramp.studies.field_layout import field_tables
 from coramp.studies.paired import paired_table
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
+from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 from coramp.studies.worth_layout import worth_tables
@@ -40,7 +41,7 @@ IMPORTANT = (
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
 
-def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
+def summary_tables(study: Study, runs: pl.DataFrame, unit: SpeedUnit = MPS) -> list[Table]:
     """Returns a study's tables: those of its layout, every group of runs, differences, promises."""
     good = runs.filter(status="ok")
     if study.layout == "capacity":
@@ -49,11 +50,11 @@ def summary_tables(study: Study, runs: pl.DataFrame) -> list[Table]:
         make = LAYOUTS.get(study.layout)
         own = make(good) if make is not None else []
     paired = paired_table(good) if study.layout == "plain" else None
-    return [*own, overview(good), *([paired] if paired is not None else []), promises(runs)]
+    return [*own, overview(good, unit), *([paired] if paired is not None else []), promises(runs)]
 
 
-def overview(good: pl.DataFrame) -> Table:
-    """Returns one row a group of runs that differ only by their seed."""
+def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
+    """Returns one row a group of runs that differ only by their seed; speeds in a unit."""
     rows = []
     for key, group in good.group_by(GROUP, maintain_order=True):
         scenario, overrides, drivers, strategy, engine, mainline, ramp = key
@@ -68,8 +69,8 @@ def overview(good: pl.DataFrame) -> Table:
                 with_interval(of(group, "delay_bound_s")),
                 with_interval(of(group, "mainline_delay_s")),
                 with_interval(of(group, "ramp_delay_s")),
-                with_interval(of(group, "mainline_speed_mps")),
-                with_interval(of(group, "ramp_speed_mps")),
+                with_interval(_in(unit, of(group, "mainline_speed_mps"))),
+                with_interval(_in(unit, of(group, "ramp_speed_mps"))),
                 with_interval(of(group, "fuel_l")),
                 str(group["unserved"].sum()),
                 number(smallest(group["min_ttc_s"])),
@@ -86,8 +87,8 @@ def overview(good: pl.DataFrame) -> Table:
         "least the lane allows (s)",
         "mainline delay (s)",
         "ramp delay (s)",
-        "mainline speed (m/s)",
-        "ramp speed (m/s)",
+        f"mainline speed ({unit.name})",
+        f"ramp speed ({unit.name})",
         "fuel (l)",
         "unserved",
         "min TTC (s)",
@@ -119,6 +120,11 @@ def promises(runs: pl.DataFrame) -> Table:
 def of(group: pl.DataFrame, column: str) -> Estimate:
     """Returns the estimate of a column over the runs that have it."""
     return estimate(group[column].drop_nulls().to_list())
+
+
+def _in(unit: SpeedUnit, speed_mps: Estimate) -> Estimate:
+    mean, half_width, values = speed_mps
+    return Estimate(mean * unit.per_mps, half_width * unit.per_mps, values)
 
 
 def smallest(values: pl.Series) -> float:

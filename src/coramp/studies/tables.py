@@ -1,9 +1,13 @@
 """Tables as plain values, and as Markdown; the terminal's form is the command line's business."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from coramp.studies.statistics import Estimate
+
+NUMBER = re.compile(r"[-+]?\d[\d.,]*(e[-+]?\d+)?%?|[-+]?inf")
+SIGNS = frozenset("-+±%/")
 
 
 @dataclass(frozen=True)
@@ -19,6 +23,15 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     importance: tuple[str, ...] = ()
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Of each column whether all of its cells are numbers, and some are no dash."""
+        columns = list(zip(*self.rows, strict=True)) or [()] * len(self.columns)
+        return [
+            all(map(is_number, cells)) and any(cell not in ("-", "") for cell in cells)
+            for cells in columns
+        ]
 
     def to_markdown(self) -> str:
         """Returns the table as Markdown."""
@@ -45,3 +58,8 @@ def with_interval(value: Estimate, digits: int = 2) -> str:
     if math.isnan(value.half_width):
         return number(value.mean, digits)
     return f"{number(value.mean, digits)} ± {number(value.half_width, digits)}"
+
+
+def is_number(cell: str) -> bool:
+    """Returns whether a cell is a number, a sum or an interval, which is never broken."""
+    return all(word in SIGNS or NUMBER.fullmatch(word) for word in cell.split())

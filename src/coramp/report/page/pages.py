@@ -6,8 +6,10 @@ from coramp.errors import CorampError
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled, packed
+from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
 from coramp.runs.running import broken_promises
+from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
 
 RUNGS = ("free", "reach", "create", "delay", "hold")
@@ -22,21 +24,24 @@ def replay_page(runs: Sequence[RunRecords]) -> str:
     return assembled("replay.html", **_frame("Replay", runs))
 
 
-def run_page(runs: Sequence[RunRecords], versions: Row, repeat: Sequence[str]) -> str:
+def run_page(
+    runs: Sequence[RunRecords], versions: Row, repeat: Sequence[str], unit: SpeedUnit = MPS
+) -> str:
     """Returns the report of the first run; others on the same arrivals stand beside it.
 
-    ``versions`` are those that it was computed with, ``repeat`` the commands that do it again.
+    ``versions`` are those that it was computed with, ``repeat`` the commands that do it again;
+    speeds are in a unit.
     Raises CorampError where their arrivals differ.
     """
     check_same_arrivals(runs)
     return assembled(
         "run.html",
         **_frame("Report", runs),
-        asked=asked_table(runs[0]),
+        asked=asked_table(runs[0], unit),
         answer=" ".join([answer(run) for run in runs] + _difference(runs)),
         notes=[line for run in runs for line in notes(run)],
-        tables=[comparison_table(runs)],
-        pictures=[],
+        tables=[comparison_table(runs, unit)],
+        pictures=over_time_pictures(runs, unit),
         sure=_how_sure(runs),
         versions=Table("Versions", ("what", "version"), tuple(map(_texts, versions.items()))),
         repeat="\n".join(repeat),
@@ -91,14 +96,15 @@ def _texts(pair: tuple[str, object]) -> tuple[str, str]:
     return pair[0], str(pair[1])
 
 
-def asked_table(run: RunRecords) -> Table:
-    """Returns the road, traffic and error budget that were asked about."""
+def asked_table(run: RunRecords, unit: SpeedUnit = MPS) -> Table:
+    """Returns the road, traffic and error budget that were asked about; speeds in a unit."""
     scenario = run.scenario
     mainline, ramp, safety = scenario.mainline, scenario.ramp, scenario.safety
+    speeds_text = [f"{unit.of(s.speed_mps):g} {unit.name}" for s in (mainline, ramp)]
     rows = (
         ("scenario", f"{scenario.name}: {scenario.description}".rstrip(": ")),
-        ("mainline", f"{mainline.start_m:g} to {mainline.end_m:g} m, {mainline.speed_mps:g} m/s"),
-        ("ramp", f"{-ramp.start_m:g} m, {ramp.speed_mps:g} m/s, at {ramp.merge_angle_deg:g}°"),
+        ("mainline", f"{mainline.start_m:g} to {mainline.end_m:g} m, {speeds_text[0]}"),
+        ("ramp", f"{-ramp.start_m:g} m, {speeds_text[1]}, at {ramp.merge_angle_deg:g}°"),
         ("acceleration lane", f"{ramp.acceleration_lane_m:g} m"),
         ("flow, mainline + ramp", run.flows),
         ("arrivals", _arrivals(run)),
@@ -177,8 +183,8 @@ def notes(run: RunRecords) -> list[str]:
     return found
 
 
-def comparison_table(runs: Sequence[RunRecords]) -> Table:
-    """Returns the figures of runs side by side."""
+def comparison_table(runs: Sequence[RunRecords], unit: SpeedUnit = MPS) -> Table:
+    """Returns the figures of runs side by side; speeds in a unit."""
     lines: list[tuple[str, str, int]] = [
         ("delay of all, mean (s)", "delay_s", 2),
         ("least delay that the lane allows, of all (s)", "delay_bound_s", 2),
@@ -187,8 +193,8 @@ def comparison_table(runs: Sequence[RunRecords]) -> Table:
         ("mainline delay, 95th percentile (s)", "mainline_delay_p95_s", 2),
         ("ramp delay, mean (s)", "ramp_delay_s", 2),
         ("ramp delay, 95th percentile (s)", "ramp_delay_p95_s", 2),
-        ("mainline speed, mean (m/s)", "mainline_speed_mps", 2),
-        ("ramp speed, mean (m/s)", "ramp_speed_mps", 2),
+        (f"mainline speed, mean ({unit.name})", "mainline_speed_mps", 2),
+        (f"ramp speed, mean ({unit.name})", "ramp_speed_mps", 2),
         ("mainline delay, first come first served (s)", "mainline_fcfs_delay_s", 2),
         ("ramp delay, first come first served (s)", "ramp_fcfs_delay_s", 2),
         ("most that the lane carries (veh/h)", "lane_limit_veh_h", 0),
@@ -210,11 +216,15 @@ def comparison_table(runs: Sequence[RunRecords]) -> Table:
         *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
     ]
     rows = tuple(
-        (text, *(number(run.summary.get(key), digits) for run in runs))
+        (text, *(number(_shown(run.summary.get(key), key, unit), digits) for run in runs))
         for text, key, digits in lines
         if any(run.summary.get(key) is not None for run in runs)
     )
     return Table("Figures", ("what", *(title_of(run) for run in runs)), rows)
+
+
+def _shown(value: float | None, key: str, unit: SpeedUnit) -> float | None:
+    return unit.of(value) if key.endswith("_speed_mps") else value
 
 
 def _how_sure(runs: Sequence[RunRecords]) -> list[str]:

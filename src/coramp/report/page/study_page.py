@@ -1,6 +1,6 @@
 """The report of a study: its answer, its tables and pictures, and what it does not know."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import polars as pl
@@ -14,12 +14,15 @@ from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.front_figure import front_figure
 from coramp.report.page.assemble import assembled, packed
+from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
+from coramp.report.page.study_answer import own_answer
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
+from coramp.report.varied_figure import readable, varied_figure
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.shown import (
@@ -30,6 +33,7 @@ from coramp.studies.shown import (
     shared_flows,
     shown_rows,
 )
+from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.statistics import estimate
 from coramp.studies.summary import promises, summary_tables
 from coramp.studies.tables import Table, with_interval
@@ -48,31 +52,36 @@ DRAWN = {
     ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
 }
+SHOWN_WITH = "Shown over time, and to be watched, are runs with"
+OWN = "Mean delay over what varies, with 95 % intervals over seeds"
+"""The figure of a study whose layout has none of its own."""
 
 
-def study_page(folder: Path) -> str:
-    """Returns the report of a study, of as many of its runs as are done.
+def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
+    """Returns the report of a study, of as many of its runs as are done; speeds are in a unit.
 
     The runs that can be watched are those of which the study has kept records. Raises CorampError
     where there is no study, or none of its runs went well.
     """
     content = study_content(folder)
-    study, runs = stored_runs(folder)
-    good = runs.filter(status="ok")
+    study, every = stored_runs(folder)
+    good = every.filter(status="ok")
     if good.is_empty():
-        reason = f": {runs['error'][0]}" if runs.height else ""
+        reason = f": {every['error'][0]}" if every.height else ""
         raise CorampError(f"{folder}: no run went well{reason}; start its coramp study again")
-    cells, packs, said = _cells(folder, good)
+    by_flow, said = _shown(folder, good)
+    cells, packs = _cells(by_flow)
+    over_time = [row for runs in by_flow.values() for row in over_time_pictures(runs, unit)]
     return assembled(
         "study.html",
         title=f"Report: study {study.name}",
         subtitle=study.description,
         asked=_asked(study, good, listed=_lists_arrivals(content)),
-        answer=_answer(good),
-        notes=[*_notes(study, runs, listed=_lists_arrivals(content)), *said],
-        tables=summary_tables(study, runs),
-        pictures=pictures_of(study.layout, good),
-        failed=_failed(runs),
+        answer=own_answer(good) if study.layout == "plain" else _answer(good),
+        notes=[*_notes(study, every, listed=_lists_arrivals(content)), *said],
+        tables=summary_tables(study, every, unit),
+        pictures=[*pictures_of(study.layout, good), *over_time],
+        failed=_failed(every),
         sure=_how_sure(good, listed=_lists_arrivals(content)),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
         repeat=f"coramp study {_file_of(study)} --seeds {good['seed'].n_unique()}",
@@ -193,33 +202,43 @@ def pictures_of(layout: str, good: pl.DataFrame) -> list[Row]:
     """Returns the figures of a study's layout, of the runs that went well, as parts of a page."""
     if good.is_empty():
         return []
-    return [picture(text, draw(good)) for text, draw in DRAWN.get(layout, ())]
+    if layout in DRAWN:
+        return [picture(text, draw(good)) for text, draw in DRAWN[layout]]
+    over = readable(good)
+    return [picture(OWN, varied_figure(good, over))] if over is not None else []
 
 
-def _cells(folder: Path, good: pl.DataFrame) -> tuple[list[Row], dict[str, str], list[str]]:
-    """Returns the runs to watch by flow and title, each packed by its key, and what is said."""
-    by_flow: dict[str, list[RunRecords]] = {}
+def _shown(folder: Path, good: pl.DataFrame) -> tuple[dict[str, list[RunRecords]], list[str]]:
+    """Returns the runs to watch by flow, and what is said of them and of those that are not."""
+    found: dict[str, list[RunRecords]] = {}
     said: list[str] = []
     for row in shown_rows(good):
         run = read_shown(folder, row)
         if run is None:
             continue
         if same_delays(row, run.summary):
-            by_flow.setdefault(run.flows, []).append(run)
+            found.setdefault(run.flows, []).append(run)
         else:
             said.append(
                 f"{title_of(run)} at {run.flows} is not shown: its records have other delays than "
                 "the study"
             )
+        if row["overrides"] and (line := f"{SHOWN_WITH} {row['overrides']}.") not in said:
+            said.append(line)
+    if not found and not said:
+        said.append("The study has kept no runs to watch; start its coramp study again for them.")
+    return found, said
+
+
+def _cells(by_flow: Mapping[str, Sequence[RunRecords]]) -> tuple[list[Row], dict[str, str]]:
+    """Returns the runs to watch by flow and title, each packed by its key."""
     cells: list[Row] = []
     packs: dict[str, str] = {}
-    for flows, runs in by_flow.items():
+    for where, runs in by_flow.items():
         check_same_arrivals(runs)
         found: dict[str, str] = {}
         for run in runs:
             key = f"run-{len(packs)}"
             packs[key], found[title_of(run)] = packed(run), key
-        cells.append({"flow": flows, "runs": found})
-    if not cells and not said:
-        said.append("The study has kept no runs to watch; start its coramp study again for them.")
-    return cells, packs, said
+        cells.append({"flow": where, "runs": found})
+    return cells, packs

@@ -1,0 +1,95 @@
+"""Speed and delay over time of runs on the same arrivals, a line each."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from coramp.metrics.motion import BIN_S
+from coramp.records.run import RunRecords
+from coramp.report.style import grid, legend_below, look_of, new_figure
+from coramp.studies.speed_unit import MPS, SpeedUnit
+
+STREAMS = ("mainline", "ramp")
+MEAN_OVER_S = 60.0
+"""Lines are means over so long, a tenth of a short run's horizon, but over 10 s at least."""
+SHARE, LEAST_S = 0.1, 10.0
+Line = tuple[np.ndarray, np.ndarray]
+
+
+def speeds_over_time_figure(runs: Sequence[RunRecords], unit: SpeedUnit = MPS) -> Figure:
+    """Returns the mean speed of each stream over time (s), each vehicle and second counting once.
+
+    From the first arrival until the last vehicle has left.
+    """
+
+    def speeds(run: RunRecords, stream: str) -> Line:
+        times_s, speeds_mps = binned(
+            run.speeds.filter(stream=stream), ("time_s", "mean_speed_mps", "vehicles"), _step_s(run)
+        )
+        return times_s, speeds_mps * unit.per_mps
+
+    return _figure(runs, speeds, f"mean speed ({unit.name})")
+
+
+def delays_over_time_figure(runs: Sequence[RunRecords]) -> Figure:
+    """Returns the mean delay (s) of who was due at a time (s), by stream."""
+
+    def delays(run: RunRecords, stream: str) -> Line:
+        here = run.vehicles.filter(stream=stream).with_columns(count=pl.lit(1))
+        return binned(here, ("scheduled_s", "delay_s", "count"), _step_s(run))
+
+    return _figure(runs, delays, "mean delay of who was due then (s)")
+
+
+def binned(frame: pl.DataFrame, columns: tuple[str, str, str], step_s: float) -> Line:
+    """Returns middles of bins (s) and the weighed mean of each; bins without anything are left out.
+
+    ``columns`` name time, value and weight.
+    """
+    time, value, weight = columns
+    good = frame.drop_nulls([time, value])
+    if good.is_empty():
+        return np.empty(0), np.empty(0)
+    places = np.floor(good[time].to_numpy() / step_s).astype(np.int64)
+    weights = good[weight].to_numpy().astype(np.float64)
+    total = np.bincount(places, weights * good[value].to_numpy())
+    counts = np.bincount(places, weights)
+    there = counts > 0.0
+    return (np.flatnonzero(there) + 0.5) * step_s, total[there] / counts[there]
+
+
+def _step_s(run: RunRecords) -> float:
+    step_s = min(MEAN_OVER_S, SHARE * run.scenario.simulation.horizon_s)
+    return max(LEAST_S, BIN_S, step_s)
+
+
+def _figure(
+    runs: Sequence[RunRecords], line_of: Callable[[RunRecords, str], Line], name: str
+) -> Figure:
+    figure = new_figure(9.0, 4.6)
+    diagrams = figure.subplots(2, 1, sharex=True)
+    for axes, stream in zip(diagrams, STREAMS, strict=True):
+        for run in runs:
+            _draw(axes, run, line_of(run, stream))
+        axes.set(title=stream, ylim=(min(0.0, axes.get_ylim()[0]), None))
+    figure.supylabel(name, fontsize=9)
+    diagrams[-1].set_xlabel("time (s)")
+    grid(*diagrams)
+    legend_below(figure, diagrams, 3)
+    return figure
+
+
+def _draw(axes: Axes, run: RunRecords, line: Line) -> None:
+    look = look_of(run.content["strategy"], run.content["drivers"])
+    axes.plot(
+        *line,
+        color=look.colour,
+        linestyle=look.line,
+        linewidth=look.width_pt,
+        marker=look.marker,
+        markevery=max(1, len(line[0]) // 10),
+        label=look.label,
+    )

@@ -1,0 +1,142 @@
+"""The report of a study of one's own, and speeds and delays over time in it."""
+
+import re
+
+import numpy as np
+import polars as pl
+import pytest
+
+import coramp
+from coramp.report.over_time_figure import (
+    binned,
+    delays_over_time_figure,
+    speeds_over_time_figure,
+)
+from coramp.report.page.study_answer import own_answer
+from coramp.report.writing import report
+from coramp.studies.speed_unit import KMH
+from coramp.studies.tables import Table
+from tests.edges import invoke
+from tests.study import overridden, run_row, runs_of
+
+STUDY = """
+name = "own"
+scenario = "paper"
+horizon_s = 60.0
+seeds = 2
+
+[[runs]]
+strategies = ["mainline-priority", "slots", "uncontrolled"]
+engine = "exact"
+flows_veh_h = [[900.0, 400.0]]
+set = { "safety.time_gap_s" = [0.6, 1.0] }
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    root = tmp_path_factory.mktemp("own")
+    (root / "own.toml").write_text(STUDY)
+    coramp.study(str(root / "own.toml"), jobs=1, out=root / "own")
+    return root / "own"
+
+
+def captions(text):
+    return re.findall(r"<figcaption>(.*?)</figcaption>", text)
+
+
+def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
+    text = report(folder).read_text()
+    at = "at 900 + 400 veh/h, safety.time_gap_s=0.6"
+    assert captions(text) == [
+        "Mean delay over what varies, with 95 % intervals over seeds",
+        f"Mean speed over time {at}",
+        f"Mean delay over time {at}",
+    ]
+    assert "Shown over time, and to be watched, are runs with safety.time_gap_s=0.6." in text
+    assert re.findall(r'id="run-\d"', text) == ['id="run-0"', 'id="run-1"', 'id="run-2"']
+    assert "has kept no runs to watch" not in text
+    assert "<summary>Differences on the same arrivals</summary>" in text
+
+
+def test_the_answer_tells_each_setting_apart(folder):
+    text = report(folder).read_text()
+    answer = re.search(r'id="answer">(.*?)</p>', text, re.DOTALL).group(1)
+    assert answer.count("loses least") == 2
+    assert "With safety.time_gap_s=0.6 " in answer
+    assert "With safety.time_gap_s=1.0 " in answer
+
+
+def test_numbers_stand_to_the_right(folder):
+    text = report(folder).read_text()
+    assert re.search(r'<td class="short number">\d+\.\d\d ± \d+\.\d\d</td>', text)
+    assert '<th scope="col" class="number">delay of all (s)</th>' in text
+    assert re.search(r'<td(?! class="short number)[^>]*>slots</td>', text)
+
+
+def test_speeds_can_be_shown_in_kmh(folder):
+    mps, kmh = report(folder).read_text(), report(folder, kmh=True).read_text()
+    assert "mainline speed (m/s)" in mps
+    assert "mainline speed (km/h)" in kmh
+    assert "m/s)" not in kmh.split("<h2>What happened")[0].split("<tbody>")[1].split("<script")[0]
+    speeds = pl.read_parquet(folder / "runs.parquet")["mainline_speed_mps"]
+    told = [float(v) for v in re.findall(r">(\d+\.\d\d) ± \d+\.\d\d<", kmh)]
+    assert any(60.0 < v < 73.0 for v in told)
+    assert all(16.0 < v < 20.1 for v in speeds)
+
+
+def test_the_report_of_a_run_has_speed_and_delay_over_time_too(tmp_path):
+    out = tmp_path / "r"
+    coramp.run("paper", engine="exact", horizon_s=60.0, out=out)
+    assert invoke("report", out, "--kmh").code == 0
+    text = (out / "report.html").read_text()
+    assert len(captions(text)) == 2
+    assert "-400 to 400 m, 72 km/h" in text
+    assert "mainline speed, mean (km/h)" in text
+    told = float(re.search(r"mainline speed, mean \(km/h\)</td><td[^>]*>([\d.]+)<", text).group(1))
+    assert told == pytest.approx(3.6 * coramp.load(out).summary["mainline_speed_mps"], abs=0.006)
+    assert "--kmh" in invoke("report", "--help").out
+
+
+def test_bins_hold_weighed_means_and_empty_ones_are_left_out():
+    frame = pl.DataFrame({"t": [0.0, 5.0, 31.0], "v": [10.0, 20.0, 7.0], "n": [1, 3, 2]})
+    times_s, means = binned(frame, ("t", "v", "n"), 10.0)
+    assert times_s.tolist() == [5.0, 35.0]
+    assert means.tolist() == [17.5, 7.0]
+    assert len(binned(frame.clear(), ("t", "v", "n"), 10.0)[0]) == 0
+
+
+def test_lines_over_time_are_those_of_the_records():
+    run = coramp.run("paper", engine="exact", horizon_s=100.0, mainline_veh_h=900)
+    mainline, ramp = delays_over_time_figure([run]).axes
+    for axes, stream in ((mainline, "mainline"), (ramp, "ramp")):
+        (line,) = axes.get_lines()
+        here = run.vehicles.filter(stream=stream)
+        first = here.filter(pl.col("scheduled_s") < 10.0)["delay_s"]
+        if len(first):
+            assert line.get_ydata()[0] == pytest.approx(first.mean())
+    (one,), (other,) = (
+        speeds_over_time_figure([run], *unit).axes[0].get_lines() for unit in ((), (KMH,))
+    )
+    assert np.allclose(3.6 * one.get_ydata(), other.get_ydata())
+
+
+def test_the_answer_says_how_sure_it_is():
+    def delays(strategy, by_seed):
+        return [run_row(strategy, seed=s, delay_s=d) for s, d in enumerate(by_seed, 1)]
+
+    good = runs_of(*delays("slots", (1.0, 5.0, 9.0)), *delays("game", (1.5, 5.7, 9.6)))
+    assert own_answer(good) == (
+        "At 800 + 200 veh/h, on the same arrivals: Slots loses least, 5.00 ± 9.94 s a vehicle; "
+        "game 0.60 ± 0.25 s more."
+    )
+    good = runs_of(*delays("slots", (1.0, 5.0, 9.0)), *delays("game", (1.5, 4.7, 9.6)))
+    assert own_answer(good).endswith("s more, which may be chance.")
+    once = runs_of(
+        *delays("slots", (1.0,)), overridden(run_row(delay_s=3.0), "safety.adhesion=0.3")
+    )
+    assert "Slots loses least, 1.00 s a vehicle." in own_answer(once)
+
+
+def test_a_column_of_numbers_knows_it():
+    assert Table("T", ("a", "b"), (("x", "1"), ("2", "3.5 ± 0.1"))).numeric == [False, True]
