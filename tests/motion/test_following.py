@@ -200,9 +200,9 @@ own = st.fixed_dictionaries(
 def pairs(draw):
     """A follower that cruises, and a leader that drives slower now and then."""
     speeds = st.floats(8.0, 20.0)
-    stretches = []
-    for _ in range(draw(st.integers(0, 3))):
-        stretches.append((draw(speeds), draw(st.integers(20, 80)) / 10.0))
+    stretches = [
+        (draw(speeds), draw(st.integers(20, 80)) / 10.0) for _ in range(draw(st.integers(0, 3)))
+    ]
     leader_mps = draw(speeds)
     previous, kept = leader_mps, []
     for reached_mps, lasts_s in stretches:
