@@ -145,6 +145,38 @@ def sampled_margins(front, front_length_m, rear, times_s, safety):
     )
 
 
+def sampled_own_margins(front, front_traits, rear, rear_traits, times_s, safety):
+    """Bumper distances less Eq. 1 with each vehicle's own errors and the follower's time gap."""
+    front_own, rear_own = Traits(*front_traits), Traits(*rear_traits)
+    front_m, front_mps = sampled(front, times_s)
+    rear_m, rear_mps = sampled(rear, times_s)
+    closing_km_h = np.maximum(0.0, 3.6 * rear_mps - 3.6 * front_mps)
+    return (
+        front_m
+        - front_own.length_m
+        - rear_m
+        - front_own.positioning_error_m
+        - rear_own.positioning_error_m
+        - front_own.clock_error_s * front_mps
+        - rear_own.clock_error_s * rear_mps
+        - closing_km_h**2 / (254.0 * (safety.adhesion + safety.resistance))
+        - rear_own.time_gap_s * rear_mps
+        - safety.standstill_gap_m
+    )
+
+
+def truck(**own):
+    """What the built-in truck can do that cruises at 24 m/s, but for ``own``."""
+    usual = {
+        "top_speed_mps": 24.0,
+        "acceleration_mps2": 1.0,
+        "power_wpkg": 5.5,
+        "braking_mps2": 2.5,
+        "mass_kg": 40000.0,
+    }
+    return sized(16.5, **{**usual, **own})
+
+
 def sized(length_m=5.0, safety=SAFETY, **own):
     """What a vehicle of a length can do: only the common limits bind it, but for ``own``."""
     usual = Traits(length_m, safety.positioning_error_m, safety.clock_error_s, safety.time_gap_s)
@@ -152,17 +184,19 @@ def sized(length_m=5.0, safety=SAFETY, **own):
 
 
 def fleet_of(*vehicles, live=None, safety=SAFETY):
-    """Commitments of ``(pieces, merge time)``, 5 m long unless a length follows."""
+    """Commitments of ``(pieces, merge time)``, 5 m long unless a length, or traits, follow."""
     rows = [vehicle[0] for vehicle in vehicles]
     counts = [len(row) for row in rows]
     ranges = [intercept_range_m(row, row[0, 0], 20.0) for row in rows]
+    told = [vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]
+    traits = np.array([sized(own, safety) if np.isscalar(own) else own for own in told])
     return Fleet(
         pieces=np.concatenate(rows),
         first_piece=np.cumsum([0, *counts[:-1]]),
         piece_count=np.array(counts),
-        length_m=np.array([vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]),
+        length_m=traits[:, 0].copy(),
         merge_time_s=np.array([vehicle[1] for vehicle in vehicles]),
         intercepts_m=np.array(ranges),
-        traits=np.array([sized(v[2] if len(v) > 2 else 5.0, safety) for v in vehicles]),
+        traits=traits,
         live=np.arange(len(rows)) if live is None else np.array(live),
     )

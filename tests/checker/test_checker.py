@@ -58,11 +58,12 @@ class New(NamedTuple):
 
 
 def traffic(*vehicles, live=None):
-    """What was told of ``(pieces, merge time)``, 5 m long unless a length follows."""
+    """What was told of ``(pieces, merge time)``, 5 m long unless a length, or traits, follow."""
     record = empty_record(len(vehicles) + 1, 1000)
     for vehicle in vehicles:
-        length_m = vehicle[2] if len(vehicle) > 2 else 5.0
-        note_entry(record, sized(length_m), vehicle[1], vehicle[0], BOUNDS.zone_end_m)
+        own = vehicle[2] if len(vehicle) > 2 else 5.0
+        traits = sized(own) if np.isscalar(own) else own
+        note_entry(record, traits, vehicle[1], vehicle[0], BOUNDS.zone_end_m)
     if live is not None:
         record.live[: len(live)] = live
         record.used[LIVE] = len(live)

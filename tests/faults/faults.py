@@ -118,7 +118,11 @@ FAULTS = (
     Fault(
         "planners and checker both take half of the positioning error in Eq. 1",
         (
-            Edit("checker/distances.py", "by_paper_m = 2.0 * bounds", "by_paper_m = 1.0 * bounds"),
+            Edit(
+                "checker/distances.py",
+                "by_paper_m = needs.errors_m + clock_m",
+                "by_paper_m = 0.5 * needs.errors_m + clock_m",
+            ),
             Edit(
                 "equations/safe_distance.py",
                 "        2.0 * safety.positioning_error_m\n",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coramp.road.rules import Control, Rules, packed, unpacked
+from coramp.road.rules import Control, Rules, Traffic, packed, unpacked
 from tests.mathematics import RULES
 
 
@@ -11,7 +11,7 @@ def test_packing_and_unpacking_gives_the_same_rules():
         Control(0.1, 0.2, 0.5, gap_at_front=True, create_from_nose=False),
         Control(0.1, 0.2, 0.5, gap_at_front=False, create_from_nose=True),
     ):
-        rules = RULES._replace(control=control)
+        rules = RULES._replace(control=control, traffic=Traffic(True, 12.5))
         assert unpacked(packed(rules)) == rules
 
 
