@@ -21,7 +21,7 @@ from coramp.kinematics.trajectory import (
 )
 from coramp.road.rules import Rules
 from coramp.vehicles.fleet import ROUNDING_M, pair_margin_m
-from coramp.vehicles.traits import SPEED_BAND_MPS, able_mps2, cruise_mps
+from coramp.vehicles.traits import BRAKING, SPEED_BAND_MPS, able_mps2, cruise_mps
 
 SAME_SPEED_MPS = 1e-9
 LONGEST_LOOK_S = 60.0
@@ -73,7 +73,7 @@ def follow(
     at that time is aimed at. ``dip_mps`` is by how much the vehicle brakes below that speed first,
     which opens the gap: it goes back up at once. It never drives faster than its own cruise.
     """
-    slow_down_mps2 = common_rules.motion.slow_down_mps2
+    slow_down_mps2 = min(common_rules.motion.slow_down_mps2, traits[BRAKING])
     n = clip_start(base, base[0, TIME], out)
     n = clip_end(out, n, max(base[0, TIME], brake_from_s))
     n = _brake_to_leader(out, n, dip_mps, leader, leader_from_s, slow_down_mps2)
@@ -216,6 +216,22 @@ def _brake_to_leader(
 
 
 @kernel
+def _brake_along(
+    out: FloatArray, n: int, mps2: float, at_once: bool, lasts_s: float, ends_mps: float
+) -> int:
+    """Appends braking by ``mps2`` to the speed with which a leader's piece ends.
+
+    It begins at once, or so that it is over with that piece if that is possible.
+    """
+    needed_s = (out[n - 1, SPEED] - max(LEAST_SPEED_MPS, ends_mps)) / mps2
+    if needed_s <= 0.0:
+        return n
+    if not at_once:
+        n = drive(out, n, 0.0, max(0.0, lasts_s - needed_s))
+    return drive(out, n, -mps2, min(lasts_s, needed_s))
+
+
+@kernel
 def _drive_as(
     out: FloatArray,
     n: int,
@@ -224,9 +240,14 @@ def _drive_as(
     traits: FloatArray,
     common_rules: Rules,
 ) -> int:
-    """Appends what the leader drives from here on, as far as the vehicle can, up to its cruise."""
+    """Appends what the leader drives from here on, as far as the vehicle can, up to its cruise.
+
+    One that cannot brake as hard as the leader does goes on braking after it.
+    """
     cruise, now_s = cruise_mps(traits, common_rules), out[n - 1, TIME]
     comfort_mps2 = common_rules.motion.comfort_mps2
+    hardest_mps2 = min(comfort_mps2, traits[BRAKING])
+    slow_down_mps2 = min(common_rules.motion.slow_down_mps2, hardest_mps2)
     if now_s < leader_from_s:
         n = drive(out, n, 0.0, leader_from_s - now_s)
         now_s = leader_from_s
@@ -242,14 +263,15 @@ def _drive_as(
             if ends_mps > speed_mps:
                 accel_mps2 = min(accel_mps2, comfort_mps2, able_mps2(traits, ends_mps))
                 n = drive(out, n, accel_mps2, min(lasts_s, (ends_mps - speed_mps) / accel_mps2))
-        elif accel_mps2 < 0.0:
-            needed_s = (speed_mps - max(LEAST_SPEED_MPS, leader[k + 1, SPEED])) / -accel_mps2
-            if needed_s > 0.0:  # from when the leader is as slow
-                n = drive(out, n, 0.0, max(0.0, lasts_s - needed_s))
-                n = drive(out, n, accel_mps2, min(lasts_s, needed_s))
+        elif speed_mps > leader[k + 1, SPEED] + SAME_SPEED_MPS:
+            steady = accel_mps2 == 0.0
+            brake_mps2 = slow_down_mps2 if steady else min(-accel_mps2, hardest_mps2)
+            n = _brake_along(out, n, brake_mps2, steady, lasts_s, leader[k + 1, SPEED])
         left_s = piece_end_s(leader, k) - out[n - 1, TIME]
         n = drive(out, n, 0.0, left_s)
         k += 1
         now_s = leader[k, TIME]
     ends_mps = min(cruise, leader[len(leader) - 1, SPEED])
+    if out[n - 1, SPEED] > ends_mps + SAME_SPEED_MPS:
+        return _brake_to_leader(out, n, 0.0, leader, leader_from_s, slow_down_mps2)
     return speed_up(out, n, ends_mps, common_rules.motion.speed_up_mps2, traits)
