@@ -285,7 +285,11 @@ def _out_of_range(key: str, value: float, context: Mapping[str, float]) -> str:
 
 
 def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    inner: Any = None
     for part in location[:-1]:
+        if part in SHAPES:
+            model = _model_within(_shape_of(inner, str(part))) or model
+            continue
         field = model.model_fields.get(str(part))
         inner = field.annotation if field is not None else None
         if isinstance(inner, type) and issubclass(inner, BaseModel):
@@ -296,6 +300,14 @@ def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> st
     near = difflib.get_close_matches(str(location[-1]), names, 1)
     hint = f"did you mean {near[0]}? " if near else ""
     return f"{hint}allowed are {', '.join(names)}"
+
+
+def _shape_of(annotation: Any, tag: str) -> Any:
+    """Returns the one of several shapes of a value that has a tag of ``SHAPES``."""
+    for shape in getattr(annotation, "__args__", ()):
+        if any(getattr(mark, "tag", None) == tag for mark in getattr(shape, "__metadata__", ())):
+            return shape
+    return None
 
 
 def _model_within(annotation: Any) -> type[BaseModel] | None:
