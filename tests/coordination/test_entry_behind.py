@@ -76,6 +76,8 @@ def test_one_that_merges_ahead_counts_where_it_will_be():
     # a vehicle that has not decided counts for nothing on the mainline
     undecided = fleet_of((ahead, STREAM), (merging, UNDECIDED, truck()))
     assert last_on_mainline(undecided, 0.0) == 0
+    alone = fleet_of((merging, UNDECIDED, truck()))
+    assert last_on_mainline(alone, 0.0) == -1
     assert entry(undecided)[-1, 2] == 20.0
 
 

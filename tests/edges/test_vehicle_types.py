@@ -232,6 +232,13 @@ def test_top_speeds_fill_their_range():
     assert np.mean(drawn) == pytest.approx((low + high) / 2.0, abs=0.06)
 
 
+def test_top_speeds_have_nothing_to_do_with_who_is_a_truck():
+    drawn = [top for kind, top in kinds_of(scenario_with(CAR, TRUCK), False, 8000, 1)]
+    trucks = [top for top in drawn if np.isfinite(top)]
+    assert 800 < len(trucks) < 1120
+    assert np.mean(trucks) == pytest.approx(85.0 / 3.6, abs=0.11)  # four deviations of the mean
+
+
 def test_draws_are_the_seeds_and_the_streams_own():
     scenario = scenario_with({**CAR, "share": 0.5}, {**TRUCK, "share": 0.5})
     assert kinds_of(scenario, False, 50, 1) == kinds_of(scenario, False, 50, 1)

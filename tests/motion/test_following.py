@@ -181,7 +181,20 @@ def test_one_with_weak_brakes_gets_down_to_a_leader_that_brakes_harder():
     assert way[-1, SPEED] == close(10.0)
 
 
-tenths = st.integers(0, 240).map(lambda n: n / 10.0)
+def test_one_with_weak_brakes_goes_on_braking_after_a_leader_that_it_follows_by_hand():
+    # to 15 m/s first, then the leader brakes by 2.5 m/s2 for 2 s and the follower by 1 m/s2 for 5 s:
+    # that takes 12.5 and 7.5 m; (40 - 20 - 0.14) / 5 = 3.972 s
+    leader = pieces(0.0, -300.0, 15.0, [(15.0, 10.0), (10.0, 2.0)])
+    base = pieces(0.0, -345.0, 20.0)
+    way = following(base, leader, truck(braking_mps2=1.0))
+    assert way[:, [0, 2, 3]] == close(
+        np.array(
+            [[0.0, 20.0, 0.0], [3.9, 20.0, -1.0], [8.9, 15.0, 0.0], [10.0, 15.0, -1.0]]
+            + [[15.0, 10.0, 0.0]]
+        )
+    )
+
+
 own = st.fixed_dictionaries(
     {
         "length_m": st.sampled_from([5.0, 16.5]),

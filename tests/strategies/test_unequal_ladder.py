@@ -25,9 +25,9 @@ from coramp.strategies.situation import (
     RUNG_REACH,
     MergePlan,
 )
-from coramp.strategies.unequal_ladder import plan_unequal
-from coramp.strategies.unequal_merge import place_in_order, rows_on_mainline
-from coramp.vehicles.fleet import Fleet, Proposal
+from coramp.strategies.unequal_ladder import plan_unequal, subject_of
+from coramp.strategies.unequal_merge import place_in_order, rows_on_mainline, try_merge
+from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
 from tests.mathematics import RULES, close, fleet_of, pieces, sampled, sized, truck
 
 STREAM, UNDECIDED = -math.inf, math.inf
@@ -176,6 +176,34 @@ def test_under_mainline_priority_room_is_made_where_no_acceleration_does():
     assert found.rows == [0, 2]
     assert (found.plan.front_row, found.plan.rear_row) == (1, 2)
     assert checked(found).code == ACCEPTED
+
+
+def candidates(found):
+    """What each acceleration that is tried would move and cost with room made for it."""
+    subject = subject_of(found.fleet, 0, 0.0, 20.0, MIXED)
+    for accel_mps2 in [subject.free_mps2, *subject.tried_mps2]:
+        way = (empty_proposal(), 0, subject.approach, accel_mps2, True, subject.known_m, MIXED)
+        merge = try_merge(found.fleet, *way)
+        if merge.done:
+            yield (merge.moved, merge.lost_s), float(accel_mps2)
+
+
+def test_of_merges_that_need_room_it_takes_the_one_that_moves_fewest_and_costs_them_least():
+    rng = np.random.default_rng(1)
+    choices, by_number = 0, 0
+    for _ in range(300):
+        dense = cruising(*(-196.0 - np.cumsum(rng.uniform(5.3, 11.5, 8))).tolist())
+        found = plan(*dense)
+        if found.plan.rung != RUNG_CREATE:
+            continue
+        known = list(candidates(found))
+        best = min(cost for cost, _ in known)
+        assert found.plan.accel_mps2 in [accel for cost, accel in known if cost == best]
+        assert len(found.rows) - 1 == best[0]
+        choices += len({cost for cost, _ in known}) > 1
+        by_number += len({cost[0] for cost, _ in known}) > 1
+    assert choices > 5
+    assert by_number > 1
 
 
 def test_severity_is_that_of_the_lighter_vehicle_at_the_merge_by_hand():
