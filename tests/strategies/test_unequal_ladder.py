@@ -28,6 +28,7 @@ from coramp.strategies.situation import (
 from coramp.strategies.unequal_ladder import plan_unequal, subject_of
 from coramp.strategies.unequal_merge import place_in_order, rows_on_mainline, try_merge
 from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
+from coramp.vehicles.traits import standing_behind_m
 from tests.mathematics import RULES, close, fleet_of, pieces, sampled, sized, truck
 
 STREAM, UNDECIDED = -math.inf, math.inf
@@ -249,6 +250,17 @@ def test_one_that_stands_gets_away_nevertheless():
     stands = pieces(0.0, -1.0, 0.0)
     found = plan(rules=short, subject=stands)
     assert found.plan.rung == RUNG_FREE
+
+
+@pytest.mark.parametrize("clock_s", [3e-9, 0.02, 0.2])
+@pytest.mark.parametrize("braking_mps2", [math.inf, 0.9])
+def test_one_that_stands_gets_away_from_one_that_stands_behind(clock_s, braking_mps2):
+    ahead, behind = sized(clock_error_s=clock_s), sized(braking_mps2=braking_mps2)
+    place_m = -1.0 - 5.0 - standing_behind_m(ahead, behind, MIXED)
+    waits = (pieces(0.0, place_m, 0.0), UNDECIDED, behind)
+    found = plan(waits, own=ahead, subject=pieces(0.0, -1.0, 0.0))
+    assert found.plan.rung == RUNG_FREE
+    assert checked(found).code == ACCEPTED
 
 
 def test_a_lane_that_is_full_for_ever_holds_it():
