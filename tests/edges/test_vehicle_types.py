@@ -1,5 +1,4 @@
-"""Types of vehicles in a scenario: what is drawn, what is refused in one line, what is warned of."""
-
+"""Types of vehicles in a scenario: what is drawn, what is refused in a line, what is warned of."""
 
 import numpy as np
 import pytest
@@ -44,13 +43,17 @@ def problems(*tables, **overrides):
     [
         (
             [{**CAR, "mainline_share": 0.8}, TRUCK],
-            "vehicle: shares of the mainline sum to 0.92 (car 0.8, truck 0.12); allowed is 1 "
-            "(keys share and mainline_share)",
+            (
+                "vehicle: shares of the mainline sum to 0.92 (car 0.8, truck 0.12); allowed is 1 "
+                "(keys share and mainline_share)"
+            ),
         ),
         (
             [{**CAR, "ramp_share": 1.0}, TRUCK],
-            "vehicle: shares of the ramp sum to 1.12 (car 1, truck 0.12); allowed is 1 "
-            "(keys share and ramp_share)",
+            (
+                "vehicle: shares of the ramp sum to 1.12 (car 1, truck 0.12); allowed is 1 "
+                "(keys share and ramp_share)"
+            ),
         ),
         (
             [CAR, {**TRUCK, "name": "car"}],
@@ -66,8 +69,10 @@ def problems(*tables, **overrides):
         ),
         (
             [CAR, {**TRUCK, "braking_mps2": 0.7}],
-            "vehicle.1.braking_mps2: 0.7 does not stop before the nose from "
-            "ramp.decision_station_m; allowed is at least 0.79 m/s2",  # 17.7^2 / (2 * 199)
+            (
+                "vehicle.1.braking_mps2: 0.7 does not stop before the nose from "
+                "ramp.decision_station_m; allowed is at least 0.79 m/s2"
+            ),  # 17.7^2 / (2 * 199)
         ),
         (
             [CAR, {**TRUCK, "length_m": 41.0}],
@@ -249,7 +254,8 @@ def test_draws_are_the_seeds_and_the_streams_own():
 
 def test_types_change_neither_when_vehicles_come_nor_how_fast_cars_enter():
     plain, mixed = (
-        arrivals_of(scenario, 1) for scenario in (load_scenario("expressway"), scenario_with(CAR, TRUCK))
+        arrivals_of(scenario, 1)
+        for scenario in (load_scenario("expressway"), scenario_with(CAR, TRUCK))
     )
     assert [(a.vehicle_id, a.step) for a in plain] == [(a.vehicle_id, a.step) for a in mixed]
     for before, after in zip(plain, mixed, strict=True):
@@ -313,9 +319,11 @@ def test_strategies_for_equal_vehicles_are_refused_where_they_differ(name):
     with pytest.raises(CorampError) as caught:
         make_spec("expressway", name, engine=engine, overrides=overrides)
     assert caught.value.messages == (
-        f"strategy: {name} plans for vehicles that are alike but for their length and mass; with "
-        "these types of vehicles allowed are mainline-priority, ramp-priority, alinea, "
-        "uncontrolled",
+        (
+            f"strategy: {name} plans for vehicles that are alike but for their length and mass; "
+            "with these types of vehicles allowed are mainline-priority, ramp-priority, alinea, "
+            "uncontrolled"
+        ),
     )
 
 

@@ -14,11 +14,11 @@ from coramp.checker.distances import least_margin_m as checked_margin_m
 from coramp.checker.distances import needs_of
 from coramp.metrics.margins import budget_of
 from coramp.metrics.margins import least_margin_m as counted_margin_m
-from coramp.metrics.separations import LaneUse, lane_extremes
 from coramp.metrics.separations import MARGIN as COUNTED_MARGIN
 from coramp.metrics.separations import MERGE_FRONT as COUNTED_FRONT
 from coramp.metrics.separations import MERGE_REAR as COUNTED_REAR
 from coramp.metrics.separations import SEVERITY as COUNTED_SEVERITY
+from coramp.metrics.separations import LaneUse, lane_extremes
 from coramp.vehicles.fleet import pair_margin_m
 from coramp.vehicles.separation import smallest_margin_m
 from coramp.vehicles.traits import pair_safety
@@ -152,7 +152,7 @@ def test_metrics_and_audit_agree_with_sampling_in_a_lane():
             rows.append(sized(length_m, **budget, time_gap_s=gap_s))
         ways = [one, other]
         if sampled(one, np.array([from_s]))[0] < sampled(other, np.array([from_s]))[0]:
-            ways = ways[::-1]
+            ways.reverse()
         spans = np.full(2, from_s), np.full(2, until_s), np.zeros(2, np.bool_)
         knots_s = np.concatenate([way[:, 0] for way in ways])
         knots_s = knots_s[(knots_s >= from_s) & (knots_s <= until_s)]

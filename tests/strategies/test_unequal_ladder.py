@@ -1,4 +1,4 @@
-"""Each rung of the ladder where vehicles differ, worked by hand, and merges that the checker passes.
+"""Each rung of the ladder where vehicles differ, by hand, and merges that the checker passes.
 
 The subject drives 16 m/s at -160 m and is at the nose at 10 s. With 2 m/s2 it merges at 12 s at
 36 m, like a vehicle that has always cruised at 20 m/s from -204 m.
@@ -298,7 +298,12 @@ def test_who_is_ahead_is_told_at_the_time_of_the_merge():
     assert rows_on_mainline(fleet, 0, 0.0).tolist() == [4, 1, 2]
     order = rows_on_mainline(fleet, 0, 12.0)
     assert order.tolist() == [4, 2, 1]  # at 102, 90 and -40 m
-    assert [place_in_order(fleet, order, s, 12.0) for s in (110.0, 95.0, 0.0, -50.0)] == [0, 1, 2, 3]
+    assert [place_in_order(fleet, order, s, 12.0) for s in (110.0, 95.0, 0.0, -50.0)] == [
+        0,
+        1,
+        2,
+        3,
+    ]
 
 
 own = st.builds(
@@ -341,7 +346,5 @@ def test_the_checker_passes_whatever_is_proposed(others, subject, ramp_first, sl
     assert 0.0 < found.plan.merge_station_m <= RULES.road.last_merge_station_m + 1e-6
     # nobody ahead of the merge is touched
     ahead = rows_on_mainline(found.fleet, 0, found.plan.merge_time_s)
-    place = place_in_order(
-        found.fleet, ahead, found.plan.merge_station_m, found.plan.merge_time_s
-    )
+    place = place_in_order(found.fleet, ahead, found.plan.merge_station_m, found.plan.merge_time_s)
     assert not set(found.rows[1:]) & set(ahead[:place].tolist())

@@ -82,15 +82,18 @@ errors = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 0.5), st.floats(0.0, 3.0)
 
 
 @given(front=errors, rear=errors, v_front=speeds, v_rear=speeds, still_m=st.floats(0.0, 3.0))
-def test_each_ones_own_errors_count_and_the_followers_time_gap(front, rear, v_front, v_rear, still_m):
+def test_each_ones_own_errors_count_and_the_followers_time_gap(
+    front, rear, v_front, v_rear, still_m
+):
     budget = SAFETY._replace(standstill_gap_m=still_m)
     rows = [
-        sized(5.0, positioning_error_m=p, clock_error_s=c, time_gap_s=g) for p, c, g in (front, rear)
+        sized(5.0, positioning_error_m=p, clock_error_s=c, time_gap_s=g)
+        for p, c, g in (front, rear)
     ]
     closing_km_h = 3.6 * max(0.0, v_rear - v_front)
-    expected = (
-        front[0] + rear[0] + front[1] * v_front + rear[1] * v_rear + rear[2] * v_rear
-    ) + (closing_km_h**2 / (254.0 * 0.51) + still_m)
+    expected = (front[0] + rear[0] + front[1] * v_front + rear[1] * v_rear + rear[2] * v_rear) + (
+        closing_km_h**2 / (254.0 * 0.51) + still_m
+    )
     assert safe_distance_m(v_front, v_rear, pair_safety(*rows, budget)) == pytest.approx(
         expected, rel=1e-12, abs=1e-12
     )
@@ -118,8 +121,8 @@ def test_one_that_stops_behind_another_counts_its_own_braking_and_errors():
 
 
 def test_one_that_stands_behind_another_leaves_room_for_that_to_start():
-    # its clock error of 0.2 s asks for 0.2 * 1.5 t, and 0.75 t^2 come about: 0.03 m are missing. One
-    # that brakes by 0.9 m/s2 to its stop needs 0.2^2 / 4 / (1 / 1.8 - 0.10005) = 0.022 m
+    # its clock error of 0.2 s asks for 0.2 * 1.5 t, and 0.75 t^2 come about: 0.03 m are missing.
+    # One that brakes by 0.9 m/s2 to its stop needs 0.2^2 / 4 / (1 / 1.8 - 0.10005) = 0.022 m
     weak = sized(braking_mps2=0.9)
     assert 0.04 / 4.0 / (1.0 / 1.8 - 12.96 / 129.54) < 0.03
     assert standing_behind_m(sized(clock_error_s=0.2), weak, RULES) == close(0.14 + 0.03, abs=1e-8)

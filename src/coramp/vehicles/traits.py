@@ -100,7 +100,7 @@ def standing_behind_m(front: FloatArray, rear: FloatArray, rules: Rules) -> floa
     safety = pair_safety(front, rear, rules.safety)
     still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
     starts_m = still_m + 0.5 * front[CLOCK] ** 2 * rules.motion.speed_up_mps2
-    return max(standing_clearance_m(rules.road, safety, stop_mps2), starts_m)
+    return float(max(standing_clearance_m(rules.road, safety, stop_mps2), starts_m))
 
 
 @kernel
