@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from coramp.kinematics.trajectory import ACCEL, MAX_PIECES, SPEED, STATION, TIME, begin
-from coramp.motion.following import follow, follow_safely, speed_up
+from coramp.motion.following import Leader, follow, follow_safely, speed_up
 from tests.mathematics import (
     RULES,
     close,
@@ -38,9 +38,7 @@ def following(base, leader, traits=None, leader_traits=None, **more):
         base,
         asked["merge_s"],
         asked["from_s"],
-        leader,
-        asked["leader_s"],
-        sized() if leader_traits is None else leader_traits,
+        Leader(leader, sized() if leader_traits is None else leader_traits, asked["leader_s"]),
         sized() if traits is None else traits,
         asked["dip_mps"],
         RULES,
@@ -261,6 +259,7 @@ def test_a_follower_keeps_its_distance_brakes_as_late_as_it_can_or_not_at_all(pa
 
 
 def braked(pair, from_s):
-    base, leader, traits, _ = pair
+    base, driven, traits, leader_traits = pair
+    leader = Leader(driven, leader_traits, STREAM)
     out = np.empty((MAX_PIECES, 4))
-    return out[: follow(base, from_s, 0.0, leader, STREAM, traits, RULES, out)]
+    return out[: follow(base, from_s, 0.0, leader, traits, RULES, out)]
