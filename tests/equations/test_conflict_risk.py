@@ -12,6 +12,7 @@ from coramp.equations.conflict_risk import (
     conflict_severity_m2ps4,
     relative_urgent_acceleration_mps2,
     severity_m2ps4,
+    severity_of_masses_m2ps4,
     urgent_acceleration_mps2,
 )
 from tests.mathematics import close
@@ -67,6 +68,24 @@ def test_severity_of_equal_masses_in_both_forms_whichever_is_faster():
 def test_severity_is_nothing_at_equal_speeds_and_infinite_for_an_overlap():
     assert conflict_severity_m2ps4(20.0, 20.0, -1.0) == (0.0, 0.0)
     assert conflict_severity_m2ps4(20.0, 17.0, -1.0) == (math.inf, math.inf)
+
+
+def test_severity_of_unequal_masses_is_that_of_the_lighter_vehicle():
+    # 1500 kg against 40 t: k = 10^p = 0.0375; a = 3 / (1.0375 * 0.2), times 5.55 and 0.45
+    accel_mps2 = 3.0 / (1.0375 * 0.2)
+    expected = (close(accel_mps2 * 5.55), close(accel_mps2 * 0.45))
+    for masses in ((1500.0, 40000.0), (40000.0, 1500.0)):
+        assert severity_of_masses_m2ps4(20.0, 17.0, 10.0, *masses) == expected
+        assert severity_of_masses_m2ps4(17.0, 20.0, 10.0, *masses) == expected
+    # it is Eq. 6 for the lighter one, and more than that of the heavier one
+    assert accel_mps2 == close(collision_acceleration_from_masses_mps2(1500.0, 40000.0, 3.0, 0.2))
+    assert accel_mps2 > collision_acceleration_from_masses_mps2(40000.0, 1500.0, 3.0, 0.2)
+
+
+def test_severity_of_equal_masses_is_that_of_equal_vehicles():
+    for mass_kg in (1.0, 1500.0, 40000.0):
+        same = severity_of_masses_m2ps4(20.0, 17.0, 10.0, mass_kg, mass_kg)
+        assert same == conflict_severity_m2ps4(20.0, 17.0, 10.0)
 
 
 def test_threshold_is_the_square_of_three_tenths_of_g():

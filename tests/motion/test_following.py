@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from coramp.kinematics.trajectory import ACCEL, MAX_PIECES, SPEED, STATION, TIME, begin
-from coramp.motion.following import follow, follow_safely, speed_up
+from coramp.motion.following import Leader, follow, follow_safely, speed_up
 from tests.mathematics import (
     RULES,
     close,
@@ -38,9 +38,7 @@ def following(base, leader, traits=None, leader_traits=None, **more):
         base,
         asked["merge_s"],
         asked["from_s"],
-        leader,
-        asked["leader_s"],
-        sized() if leader_traits is None else leader_traits,
+        Leader(leader, sized() if leader_traits is None else leader_traits, asked["leader_s"]),
         sized() if traits is None else traits,
         asked["dip_mps"],
         RULES,
@@ -181,7 +179,17 @@ def test_one_with_weak_brakes_gets_down_to_a_leader_that_brakes_harder():
     assert way[-1, SPEED] == close(10.0)
 
 
-tenths = st.integers(0, 240).map(lambda n: n / 10.0)
+def test_one_with_weak_brakes_goes_on_braking_after_a_leader_that_it_follows_by_hand():
+    # to 15 m/s first, then the leader brakes by 2.5 m/s2 for 2 s, the follower by 1 m/s2 for 5 s:
+    # that takes 12.5 and 7.5 m; (40 - 20 - 0.14) / 5 = 3.972 s
+    leader = pieces(0.0, -300.0, 15.0, [(15.0, 10.0), (10.0, 2.0)])
+    base = pieces(0.0, -345.0, 20.0)
+    way = following(base, leader, truck(braking_mps2=1.0))
+    assert way[:, 0] == close(np.array([0.0, 3.9, 8.9, 10.0, 15.0]))
+    assert way[:, 2] == close(np.array([20.0, 20.0, 15.0, 15.0, 10.0]))
+    assert way[:, 3] == close(np.array([0.0, -1.0, 0.0, -1.0, 0.0]))
+
+
 own = st.fixed_dictionaries(
     {
         "length_m": st.sampled_from([5.0, 16.5]),
@@ -200,9 +208,8 @@ own = st.fixed_dictionaries(
 def pairs(draw):
     """A follower that cruises, and a leader that drives slower now and then."""
     speeds = st.floats(8.0, 20.0)
-    stretches = [
-        (draw(speeds), draw(st.integers(20, 80)) / 10.0) for _ in range(draw(st.integers(0, 3)))
-    ]
+    lasts = st.integers(20, 80).map(lambda n: n / 10.0)
+    stretches = draw(st.lists(st.tuples(speeds, lasts), max_size=3))
     leader_mps = draw(speeds)
     previous, kept = leader_mps, []
     for reached_mps, lasts_s in stretches:
@@ -252,6 +259,7 @@ def test_a_follower_keeps_its_distance_brakes_as_late_as_it_can_or_not_at_all(pa
 
 
 def braked(pair, from_s):
-    base, leader, traits, _ = pair
+    base, driven, traits, leader_traits = pair
+    leader = Leader(driven, leader_traits, STREAM)
     out = np.empty((MAX_PIECES, 4))
-    return out[: follow(base, from_s, 0.0, leader, STREAM, traits, RULES, out)]
+    return out[: follow(base, from_s, 0.0, leader, traits, RULES, out)]

@@ -118,3 +118,11 @@ def test_one_that_stops_behind_another_counts_its_own_braking_and_errors():
     assert standing_behind_m(sized(), truck(braking_mps2=2.0, time_gap_s=1.0), RULES) == close(
         0.14 + most_m, abs=1e-6
     )
+
+
+def test_one_that_stands_behind_another_leaves_room_for_that_to_start():
+    # its clock error of 0.2 s asks for 0.2 * 1.5 t, and 0.75 t^2 come about: 0.03 m are missing.
+    # One that brakes by 0.9 m/s2 to its stop needs 0.2^2 / 4 / (1 / 1.8 - 0.10005) = 0.022 m
+    weak = sized(braking_mps2=0.9)
+    assert 0.04 / 4.0 / (1.0 / 1.8 - 12.96 / 129.54) < 0.03
+    assert standing_behind_m(sized(clock_error_s=0.2), weak, RULES) == close(0.14 + 0.03, abs=1e-8)

@@ -28,7 +28,7 @@ severity (m2/s4), gap (m), and how many violations."""
 ROUNDING_M = 1e-8
 """By so much a margin may be below 0, for rounding."""
 COLLISION_S = 0.2
-"""Eq. 8: a collision lasts 0.2 s, and both vehicles are as heavy."""
+"""Eq. 8: a collision lasts 0.2 s."""
 
 
 class Stays(NamedTuple):

@@ -13,7 +13,7 @@ from coramp.kinematics.trajectory import (
     drive_to_speed,
     station_and_speed,
 )
-from coramp.motion.following import follow_safely, speed_up
+from coramp.motion.following import Leader, follow_safely, speed_up
 from coramp.road.rules import Rules
 from coramp.vehicles.fleet import Fleet, committed
 from coramp.vehicles.traits import BRAKING, cruise_mps
@@ -50,9 +50,7 @@ def entry_behind_others(
         base[:n],
         -math.inf,
         time_s + rules.control.actuation_delay_s,
-        committed(fleet, leader),
-        fleet.merge_time_s[leader],
-        fleet.traits[leader],
+        Leader(committed(fleet, leader), fleet.traits[leader], fleet.merge_time_s[leader]),
         traits,
         max(0.0, base[0, SPEED] - slowest_mps),
         rules,

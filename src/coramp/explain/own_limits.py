@@ -10,6 +10,7 @@ import math
 import numpy as np
 import polars as pl
 
+from coramp._kernel import FloatArray
 from coramp.equations.safe_distance import (
     clock_distance_m,
     merge_distance_m,
@@ -51,24 +52,21 @@ def own_quantities(decision: Row, run: RunRecords) -> list[Quantity]:
         Quantity("", "v_R", "speed at the merge", merge_mps, "m/s"),
     ]
     along_mps = merging_speed_along_mps(merge_mps, rules.road.merge_angle_rad)
-    lines.append(Quantity("", "v_Rx", "of that along the mainline", along_mps, "m/s"))
+    lines.append(Quantity("", "v_Rx", "its part along the mainline", along_mps, "m/s"))
     for key, symbol, number in (("front", "X", "15"), ("rear", "Y", "16")):
         other_id = decision[f"{key}_vehicle_id"]
         if other_id is not None:
             other = traits_in(run, other_id, scenario)
             other_m, other_mps = state_in(run, other_id, merge_s)
-            lines += _to_other(
-                f"{symbol} ({other_id})", number, (own, merge_m, merge_mps),
-                (other, other_m, other_mps), rules,
-            )  # fmt: skip
+            name, subject = f"{symbol} ({other_id})", (own, merge_m, merge_mps)
+            lines += _to_other(name, number, subject, (other, other_m, other_mps), rules)
     return lines
 
 
-def traits_in(run: RunRecords, vehicle_id: str, scenario: Scenario) -> np.ndarray:
+def traits_in(run: RunRecords, vehicle_id: str, scenario: Scenario) -> FloatArray:
     """Returns what a vehicle can do, from ``vehicles.parquet``; null there means no own limit."""
     row = run.vehicle(vehicle_id)
     usual = scenario.usual_traits(row["length_m"])._asdict()
-    usual.update(dict.fromkeys(("top_speed_mps", "acceleration_mps2"), math.inf))
     told = {name: usual[name] if row[name] is None else row[name] for name in Traits._fields}
     return np.array(Traits(**told), np.float64)
 
@@ -79,7 +77,7 @@ def state_in(run: RunRecords, vehicle_id: str, time_s: float) -> tuple[float, fl
     return station_and_speed(driven.select(TRAJECTORY).to_numpy(), time_s)
 
 
-def _abilities(own: np.ndarray, rules: Rules, nose_mps: float | None) -> list[Quantity]:
+def _abilities(own: FloatArray, rules: Rules, nose_mps: float | None) -> list[Quantity]:
     lines = [
         Quantity("", "L_v", "length", own[LENGTH], "m"),
         Quantity("", "m", "mass", own[MASS], "kg"),
@@ -100,8 +98,8 @@ def _abilities(own: np.ndarray, rules: Rules, nose_mps: float | None) -> list[Qu
 def _to_other(
     name: str,
     number: str,
-    subject: tuple[np.ndarray, float, float],
-    other: tuple[np.ndarray, float, float],
+    subject: tuple[FloatArray, float, float],
+    other: tuple[FloatArray, float, float],
     rules: Rules,
 ) -> list[Quantity]:
     """Returns what is kept to the vehicle in front or behind at the merge, and what is needed."""

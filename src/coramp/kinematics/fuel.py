@@ -62,11 +62,12 @@ def heavy_duty_piece_fuel_l(
 ) -> float:
     """Returns the fuel (l) of a truck over a stretch of constant acceleration, exactly.
 
-    The power is a cubic in time, which Gauss' rule with two points integrates without error. A
-    truck that brakes hard enough drives its engine below ``v^2 = -m (a + g f_r) / c`` only.
+    The power is a cubic in time, which Gauss' rule with two points integrates without error. While
+    the truck brakes by a, with a + g f_r < 0, the engine pulls only above the speed at which
+    ``v^2 = -m (a + g f_r) / c``; below that it idles.
     """
     pulls_s, load_n = duration_s, mass_kg * (accel_mps2 + GRAVITY_MPS2 * ROLLING)
-    if load_n < 0.0:  # then it brakes, and is fast enough for the engine to pull at first at most
+    if load_n < 0.0:
         turns_mps = math.sqrt(-load_n / AIR_KG_PER_M)
         pulls_s = min(duration_s, max(0.0, (speed_mps - turns_mps) / -accel_mps2))
     half_s = 0.5 * pulls_s
@@ -74,14 +75,17 @@ def heavy_duty_piece_fuel_l(
     offset_mps = accel_mps2 * half_s * _GAUSS
     fuel_ml = IDLE_MLPS * (duration_s - pulls_s)
     for at_mps in (middle_mps - offset_mps, middle_mps + offset_mps):
-        work_w = at_mps * (load_n + AIR_KG_PER_M * at_mps * at_mps)
-        fuel_ml += half_s * (IDLE_MLPS + work_w / WHEEL_J_PER_ML)
+        fuel_ml += half_s * heavy_duty_rate_mlps(mass_kg, at_mps, accel_mps2)
     return LITRES_PER_MILLILITRE * fuel_ml
 
 
 @kernel
 def trajectory_fuel_l(
-    pieces: FloatArray, from_s: float, to_s: float, model: int = 0, mass_kg: float = 1500.0
+    pieces: FloatArray,
+    from_s: float,
+    to_s: float,
+    model: int = PASSENGER_CAR,
+    mass_kg: float = math.nan,
 ) -> float:
     """Returns the fuel (l) of a trajectory between two times, exactly; 0 if ``to_s <= from_s``.
 

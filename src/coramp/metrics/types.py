@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coramp._kernel import FloatArray, IntArray, kernel
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.kinematics.fuel import FUEL_MODELS
 from coramp.kinematics.trajectory import MAX_PIECES, begin, drive, time_at_station
 from coramp.motion.following import speed_up
@@ -10,14 +10,14 @@ from coramp.records.outcome import Passages
 from coramp.records.schemas import Row
 from coramp.road.rules import packed, unpacked
 from coramp.scenarios.model import Scenario
-from coramp.vehicles.traits import TOP_SPEED, Traits, cruise_mps
+from coramp.vehicles.traits import ACCELERATION, LENGTH, POWER, TOP_SPEED, Traits, cruise_mps
 
 
 def traits_of(passages: Passages, scenario: Scenario) -> FloatArray:
     """Returns what each vehicle can do, one row per vehicle (``vehicles.traits``)."""
     usual = scenario.usual_traits(0.0)
     rows = np.tile(np.array(usual, np.float64), (len(passages), 1))
-    rows[:, 0] = passages.length_m
+    rows[:, LENGTH] = passages.length_m
     for place, own in enumerate(passages.traits):
         if own is not None:
             rows[place] = own
@@ -42,13 +42,13 @@ def fuel_models_of(passages: Passages, scenario: Scenario) -> IntArray:
 
 
 def free_flow_of_each_s(passages: Passages, traits: FloatArray, scenario: Scenario) -> FloatArray:
-    """Returns each vehicle's own time through the zone if it were alone.
+    """Returns each vehicle's time (s) through the zone if it were alone.
 
-    On the mainline that is the way over its cruising speed. On the ramp it drives v_R0, or its own
-    top speed, and from the nose on it speeds up as in free movement, or as it can.
+    On the mainline that is the distance over its cruising speed. On the ramp it drives v_R0, or its
+    own top speed, and from the nose on it speeds up as in free movement, or as it can.
     """
     free_s = np.where(passages.on_ramp, scenario.ramp_free_flow_s, scenario.mainline_free_flow_s)
-    bound = ~np.isinf(traits[:, TOP_SPEED:-1]).all(axis=1)
+    bound = ~np.isinf(traits[:, [TOP_SPEED, ACCELERATION, POWER]]).all(axis=1)
     packed_rules = packed(scenario.rules())
     for place in np.flatnonzero(bound).tolist():
         free_s[place] = own_free_flow_s(traits[place], bool(passages.on_ramp[place]), packed_rules)
@@ -71,7 +71,7 @@ def own_free_flow_s(traits: FloatArray, on_ramp: bool, packed_rules: FloatArray)
 
 
 def type_figures(
-    passages: Passages, delay_s: FloatArray, fuel_l: FloatArray, finished: FloatArray
+    passages: Passages, delay_s: FloatArray, fuel_l: FloatArray, finished: BoolArray
 ) -> list[Row]:
     """Returns one row per type of vehicle and stream: how many, their mean delay and their fuel."""
     kinds = np.array(passages.vehicle_type or ("car",) * len(passages), object)
@@ -85,7 +85,7 @@ def type_figures(
                         "vehicle_type": kind,
                         "stream": "ramp" if on_ramp else "mainline",
                         "vehicles": int(own.sum()),
-                        "unserved": int((~finished[own].astype(bool)).sum()),
+                        "unserved": int((~finished[own]).sum()),
                         "delay_s": float(delay_s[own].mean()),
                         "fuel_l": float(fuel_l[own].sum()),
                     }

@@ -4,6 +4,7 @@ All functions write a trajectory into ``out`` and return its length, or 0 where 
 """
 
 import math
+from typing import NamedTuple
 
 from coramp._kernel import FloatArray, kernel
 from coramp.kinematics.trajectory import (
@@ -29,6 +30,17 @@ DIPS = 32
 """In how many steps the depth of a dip in speed is chosen."""
 LEAST_SPEED_MPS = 0.5
 """A vehicle that makes room on the road does not brake below this."""
+
+
+class Leader(NamedTuple):
+    """The vehicle ahead: what it drives, what it can do, and when it merges (s).
+
+    The merge time is minus infinity for a vehicle of the mainline.
+    """
+
+    pieces: FloatArray
+    traits: FloatArray
+    merge_time_s: float
 
 
 @kernel
@@ -61,31 +73,30 @@ def follow(
     base: FloatArray,
     brake_from_s: float,
     dip_mps: float,
-    leader: FloatArray,
-    leader_from_s: float,
+    leader: Leader,
     traits: FloatArray,
     common_rules: Rules,
     out: FloatArray,
 ) -> int:
     """Writes: drive ``base`` until ``brake_from_s``, brake to the leader's speed, drive as it does.
 
-    The leader counts from ``leader_from_s`` on, when it comes onto the lane; before that its speed
-    at that time is aimed at. ``dip_mps`` is by how much the vehicle brakes below that speed first,
+    The leader counts from its merge on, when it comes onto the lane; before that its speed at the
+    merge is aimed at. ``dip_mps`` is by how much the vehicle brakes below that speed first,
     which opens the gap: it goes back up at once. It never drives faster than its own cruise.
     """
     slow_down_mps2 = min(common_rules.motion.slow_down_mps2, traits[BRAKING])
     n = clip_start(base, base[0, TIME], out)
     n = clip_end(out, n, max(base[0, TIME], brake_from_s))
-    n = _brake_to_leader(out, n, dip_mps, leader, leader_from_s, slow_down_mps2)
+    n = _brake_to_leader(out, n, dip_mps, leader, slow_down_mps2)
     if n == 0:
         return 0
     if dip_mps > 0.0:
-        aim_mps = _leader_speed_mps(leader, out[n - 1, TIME], leader_from_s)
+        aim_mps = _leader_speed_mps(leader, out[n - 1, TIME])
         aim_mps = min(aim_mps, cruise_mps(traits, common_rules))
         n = speed_up(out, n, aim_mps, common_rules.motion.speed_up_mps2, traits)
         if n == 0:
             return 0
-    return _drive_as(out, n, leader, leader_from_s, traits, common_rules)
+    return _drive_as(out, n, leader, traits, common_rules)
 
 
 @kernel
@@ -93,9 +104,7 @@ def follow_safely(
     base: FloatArray,
     merge_s: float,
     brake_from_s: float,
-    leader: FloatArray,
-    leader_merge_s: float,
-    leader_traits: FloatArray,
+    leader: Leader,
     traits: FloatArray,
     most_dip_mps: float,
     rules: Rules,
@@ -107,18 +116,16 @@ def follow_safely(
     at the earliest, or as early as that and with the least dip of up to ``most_dip_mps``. Merge
     times are minus infinity on the mainline. Returns 0 where nothing of that is safe.
     """
-    pair = (leader, leader_traits, leader_merge_s, base[0, TIME], rules)
-    if _is_safe(base, traits, merge_s, *pair):
+    from_s = base[0, TIME]
+    if _is_safe(base, traits, merge_s, leader, from_s, rules):
         out[: len(base)] = base
         return len(base)
-    brake_from_s = max(base[0, TIME], brake_from_s)
-    step_s, large = rules.control.step_s, DIPS
+    brake_from_s, step_s = max(from_s, brake_from_s), rules.control.step_s
     enough, too_late = -1, _steps_to_brake(base, brake_from_s, leader, rules) + 1
     steps = 0
     while too_late - enough > 1:  # the latest step at which braking is safe
-        from_s = brake_from_s + steps * step_s
-        n = follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
-        if _is_safe(out[:n], traits, merge_s, *pair):
+        n = follow(base, brake_from_s + steps * step_s, 0.0, leader, traits, rules, out)
+        if _is_safe(out[:n], traits, merge_s, leader, from_s, rules):
             enough = steps
         elif steps == 0:
             break
@@ -126,23 +133,20 @@ def follow_safely(
             too_late = steps
         steps = (enough + too_late) // 2
     if enough >= 0:
-        from_s = brake_from_s + enough * step_s
-        return follow(base, from_s, 0.0, leader, leader_merge_s, traits, rules, out)
-    small, level = 0, DIPS
+        return follow(base, brake_from_s + enough * step_s, 0.0, leader, traits, rules, out)
     if most_dip_mps <= 0.0:
         return 0
+    small, large, level = 0, DIPS, DIPS
     while large - small > 1:  # the least dip
-        dip_mps = most_dip_mps * level / DIPS
-        n = follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
-        if _is_safe(out[:n], traits, merge_s, *pair):
+        n = follow(base, brake_from_s, most_dip_mps * level / DIPS, leader, traits, rules, out)
+        if _is_safe(out[:n], traits, merge_s, leader, from_s, rules):
             large = level
         elif level == DIPS:
             return 0
         else:
             small = level
         level = (small + large) // 2
-    dip_mps = most_dip_mps * large / DIPS
-    return follow(base, brake_from_s, dip_mps, leader, leader_merge_s, traits, rules, out)
+    return follow(base, brake_from_s, most_dip_mps * large / DIPS, leader, traits, rules, out)
 
 
 @kernel
@@ -150,33 +154,31 @@ def _is_safe(
     pieces: FloatArray,
     traits: FloatArray,
     merge_s: float,
-    leader: FloatArray,
-    leader_traits: FloatArray,
-    leader_merge_s: float,
+    leader: Leader,
     from_s: float,
     rules: Rules,
 ) -> bool:
     """Whether a vehicle that drives these pieces keeps its distance; never one that has none."""
     if len(pieces) == 0:
         return False
-    pair = (leader, leader_traits, leader_merge_s, from_s, rules)
-    margin_m = pair_margin_m(pieces, traits, merge_s, *pair)
+    ahead = (leader.pieces, leader.traits, leader.merge_time_s)
+    margin_m = pair_margin_m(pieces, traits, merge_s, *ahead, from_s, rules)
     return bool(margin_m >= rules.safety.execution_allowance_m - ROUNDING_M)
 
 
 @kernel
-def _steps_to_brake(base: FloatArray, from_s: float, leader: FloatArray, rules: Rules) -> int:
+def _steps_to_brake(base: FloatArray, from_s: float, leader: Leader, rules: Rules) -> int:
     """Returns how many steps later than ``from_s`` it makes sense to brake: until one leaves."""
     end_m = rules.road.mainline_end_m
-    leaves_s = min(time_at_station(leader, end_m), time_at_station(base, end_m))
+    leaves_s = min(time_at_station(leader.pieces, end_m), time_at_station(base, end_m))
     if math.isinf(leaves_s) or leaves_s <= from_s:
         leaves_s = from_s + LONGEST_LOOK_S
     return math.ceil((leaves_s - from_s) / rules.control.step_s)
 
 
 @kernel
-def _leader_speed_mps(leader: FloatArray, time_s: float, leader_from_s: float) -> float:
-    _, speed_mps = station_and_speed(leader, max(time_s, leader_from_s))
+def _leader_speed_mps(leader: Leader, time_s: float) -> float:
+    _, speed_mps = station_and_speed(leader.pieces, max(time_s, leader.merge_time_s))
     return float(speed_mps)
 
 
@@ -185,25 +187,25 @@ def _brake_to_leader(
     out: FloatArray,
     n: int,
     dip_mps: float,
-    leader: FloatArray,
-    leader_from_s: float,
+    leader: Leader,
     slow_down_mps2: float,
 ) -> int:
     """Appends braking at d until the speed is the leader's less the dip: v - d x = v_L - dip.
 
     While the leader changes its speed by a, that is after ``(v - v_L + dip) / (d + a)``.
     """
-    for _ in range(len(leader) + 1):
+    driven, merge_s = leader.pieces, leader.merge_time_s
+    for _ in range(len(driven) + 1):
         if n >= len(out) - 1:
             return 0
         now_s, speed_mps = out[n - 1, TIME], out[n - 1, SPEED]
-        aim_mps = max(LEAST_SPEED_MPS, _leader_speed_mps(leader, now_s, leader_from_s) - dip_mps)
+        aim_mps = max(LEAST_SPEED_MPS, _leader_speed_mps(leader, now_s) - dip_mps)
         if speed_mps <= aim_mps + SAME_SPEED_MPS:
             return n
-        k = piece_at(leader, max(now_s, leader_from_s))
-        accel_mps2, until_s = leader[k, ACCEL], piece_end_s(leader, k)
-        if now_s < leader_from_s:
-            accel_mps2, until_s = 0.0, leader_from_s
+        k = piece_at(driven, max(now_s, merge_s))
+        accel_mps2, until_s = driven[k, ACCEL], piece_end_s(driven, k)
+        if now_s < merge_s:
+            accel_mps2, until_s = 0.0, merge_s
         closing_mps2 = slow_down_mps2 + accel_mps2
         needed_s = math.inf
         if closing_mps2 > 1e-9:
@@ -235,8 +237,7 @@ def _brake_along(
 def _drive_as(
     out: FloatArray,
     n: int,
-    leader: FloatArray,
-    leader_from_s: float,
+    leader: Leader,
     traits: FloatArray,
     common_rules: Rules,
 ) -> int:
@@ -248,30 +249,31 @@ def _drive_as(
     comfort_mps2 = common_rules.motion.comfort_mps2
     hardest_mps2 = min(comfort_mps2, traits[BRAKING])
     slow_down_mps2 = min(common_rules.motion.slow_down_mps2, hardest_mps2)
-    if now_s < leader_from_s:
-        n = drive(out, n, 0.0, leader_from_s - now_s)
-        now_s = leader_from_s
-    k = piece_at(leader, now_s)
-    while k + 1 < len(leader):
+    driven, merge_s = leader.pieces, leader.merge_time_s
+    if now_s < merge_s:
+        n = drive(out, n, 0.0, merge_s - now_s)
+        now_s = merge_s
+    k = piece_at(driven, now_s)
+    while k + 1 < len(driven):
         if n >= len(out) - 8:
             return 0
-        lasts_s = piece_end_s(leader, k) - now_s
-        accel_mps2 = leader[k, ACCEL]
+        lasts_s = piece_end_s(driven, k) - now_s
+        accel_mps2 = driven[k, ACCEL]
         speed_mps = out[n - 1, SPEED]
         if accel_mps2 > 0.0:
-            ends_mps = min(cruise, leader[k + 1, SPEED])
+            ends_mps = min(cruise, driven[k + 1, SPEED])
             if ends_mps > speed_mps:
                 accel_mps2 = min(accel_mps2, comfort_mps2, able_mps2(traits, ends_mps))
                 n = drive(out, n, accel_mps2, min(lasts_s, (ends_mps - speed_mps) / accel_mps2))
-        elif speed_mps > leader[k + 1, SPEED] + SAME_SPEED_MPS:
+        elif speed_mps > driven[k + 1, SPEED] + SAME_SPEED_MPS:
             steady = accel_mps2 == 0.0
             brake_mps2 = slow_down_mps2 if steady else min(-accel_mps2, hardest_mps2)
-            n = _brake_along(out, n, brake_mps2, steady, lasts_s, leader[k + 1, SPEED])
-        left_s = piece_end_s(leader, k) - out[n - 1, TIME]
+            n = _brake_along(out, n, brake_mps2, steady, lasts_s, driven[k + 1, SPEED])
+        left_s = piece_end_s(driven, k) - out[n - 1, TIME]
         n = drive(out, n, 0.0, left_s)
         k += 1
-        now_s = leader[k, TIME]
-    ends_mps = min(cruise, leader[len(leader) - 1, SPEED])
+        now_s = driven[k, TIME]
+    ends_mps = min(cruise, driven[len(driven) - 1, SPEED])
     if out[n - 1, SPEED] > ends_mps + SAME_SPEED_MPS:
-        return _brake_to_leader(out, n, 0.0, leader, leader_from_s, slow_down_mps2)
+        return _brake_to_leader(out, n, 0.0, leader, slow_down_mps2)
     return speed_up(out, n, ends_mps, common_rules.motion.speed_up_mps2, traits)

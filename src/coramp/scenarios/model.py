@@ -282,7 +282,8 @@ class Scenario(Model):
     @property
     def vehicles_differ(self) -> bool:
         """Whether planners must look at each vehicle's own limits, not at its length alone."""
-        return not all(kind.is_usual for kind in self.vehicle_types)
+        limited = any(arrival.top_speed_mps is not None for arrival in self.arrivals)
+        return limited or not all(kind.is_usual for kind in self.vehicle_types)
 
     def usual_traits(self, length_m: float) -> Traits:
         """Returns the traits of a vehicle that only the common limits bind."""

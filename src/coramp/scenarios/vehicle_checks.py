@@ -27,6 +27,11 @@ def vehicle_problems(scenario: "Scenario") -> list[str]:
         for k, arrival in enumerate(scenario.arrivals)
         if arrival.type is not None and arrival.type not in names
     ]
+    problems += [
+        f"arrivals.{k}.{_too_slow(arrival.top_speed_mps)}"
+        for k, arrival in enumerate(scenario.arrivals)
+        if arrival.top_speed_mps is not None and arrival.top_speed_mps < SLOWEST_TYPE_MPS
+    ]
     return problems
 
 
@@ -39,10 +44,7 @@ def _type_problems(scenario: "Scenario", kind: VehicleType) -> list[str]:
             f"top_speed_mps: [{low_mps:g}, {high_mps:g}] falls; write the lower speed first"
         )
     if low_mps < SLOWEST_TYPE_MPS:
-        problems.append(
-            f"top_speed_mps: {low_mps:g} is too slow for any lane; "
-            f"allowed is at least {SLOWEST_TYPE_MPS:g} m/s"
-        )
+        problems.append(_too_slow(low_mps))
     if kind.length_m > scenario.ramp.acceleration_lane_m:
         problems.append(
             f"length_m: {kind.length_m:g} is longer than ramp.acceleration_lane_m; "
@@ -57,6 +59,13 @@ def _type_problems(scenario: "Scenario", kind: VehicleType) -> list[str]:
                 f"ramp.decision_station_m; allowed is at least {need_mps2:.2f} m/s2"
             )
     return problems
+
+
+def _too_slow(top_mps: float) -> str:
+    return (
+        f"top_speed_mps: {top_mps:g} is too slow for any lane; "
+        f"allowed is at least {SLOWEST_TYPE_MPS:g} m/s"
+    )
 
 
 def check_vehicles_may_differ(scenario: "Scenario", strategy: str) -> None:

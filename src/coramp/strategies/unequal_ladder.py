@@ -1,7 +1,7 @@
-"""The ladder of both priorities where vehicles differ: the same rungs, judged one merge at a time.
+"""The ladder of both priorities in heterogeneous traffic: the same rungs, one merge at a time.
 
-Without a common cruising speed no intercept says where a vehicle ends up. So a small set of
-accelerations and of late ways to the nose is tried, and each merge is looked at as it would be.
+Without a common cruising speed no intercept says where a vehicle ends up. So the planner tries a
+few accelerations and a few late ways to the nose, and examines each merge as it would happen.
 """
 
 import math
@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.equations.conflict_risk import severity_of_masses_m2ps4
 from coramp.equations.gaps import least_acceleration_mps2
-from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
@@ -25,7 +23,6 @@ from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,
     RUNG_FREE,
-    RUNG_HOLD,
     RUNG_REACH,
     MergePlan,
     foremost_unknown_m,
@@ -36,7 +33,8 @@ from coramp.strategies.unequal_merge import (
     no_unequal_merge,
     try_merge,
 )
-from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, trajectory_under
+from coramp.strategies.unequal_plan import hold_plan, unequal_plan
+from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
 from coramp.vehicles.trace import (
     CURRENT,
     MOVES_MORE,
@@ -47,7 +45,7 @@ from coramp.vehicles.trace import (
     open_attempt,
     refuse,
 )
-from coramp.vehicles.traits import LENGTH, MASS, able_mps2, cruise_mps, own_rules, pair_safety
+from coramp.vehicles.traits import LENGTH, able_mps2, cruise_mps, own_rules
 
 ACCELERATIONS = 7
 """How many accelerations are tried besides that of free movement."""
@@ -57,7 +55,11 @@ STANDING_MPS = 0.1
 
 
 class Subject(NamedTuple):
-    """Whom a decision is about: its way to the nose and the accelerations that it may use."""
+    """The vehicle that a decision is about.
+
+    ``approach`` is its way to the nose, ``tried_mps2`` are the accelerations that are tried besides
+    that of free movement. ``known_m`` is as in ``try_merge``.
+    """
 
     row: int
     from_s: float
@@ -116,19 +118,25 @@ def _accelerations(
 
 
 @kernel
+def _try_by(
+    fleet: Fleet,
+    proposal: Proposal,
+    subject: Subject,
+    approach: FloatArray,
+    accel_mps2: float,
+    make_room: bool,
+    rules: Rules,
+) -> UnequalMerge:
+    """Tries one merge of the subject, as ``try_merge`` does."""
+    way = (approach, accel_mps2, make_room, subject.known_m)
+    return try_merge(fleet, proposal, subject.row, *way, rules)
+
+
+@kernel
 def rung_free(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules) -> UnequalMerge:
     """Free movement, if nobody has to move."""
     open_attempt(proposal.trace, RUNG_FREE, 0, -1, -1)
-    return try_merge(
-        fleet,
-        proposal,
-        subject.row,
-        subject.approach,
-        subject.free_mps2,
-        False,
-        subject.known_m,
-        rules,
-    )
+    return _try_by(fleet, proposal, subject, subject.approach, subject.free_mps2, False, rules)
 
 
 @kernel
@@ -136,16 +144,7 @@ def rung_reach(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules)
     """The acceleration nearest to that of free movement with which nobody has to move."""
     for accel_mps2 in subject.tried_mps2:
         open_attempt(proposal.trace, RUNG_REACH, 0, -1, -1)
-        merge = try_merge(
-            fleet,
-            proposal,
-            subject.row,
-            subject.approach,
-            accel_mps2,
-            False,
-            subject.known_m,
-            rules,
-        )
+        merge = _try_by(fleet, proposal, subject, subject.approach, accel_mps2, False, rules)
         if merge.done:
             return merge
     return no_unequal_merge()
@@ -164,16 +163,7 @@ def rung_create(
     for k in range(-1, 0 if free_alone else ACCELERATIONS):
         accel_mps2 = subject.free_mps2 if k < 0 else subject.tried_mps2[k]
         open_attempt(proposal.trace, RUNG_CREATE, 2, -1, -1)
-        merge = try_merge(
-            fleet,
-            proposal,
-            subject.row,
-            subject.approach,
-            accel_mps2,
-            True,
-            subject.known_m,
-            rules,
-        )
+        merge = _try_by(fleet, proposal, subject, subject.approach, accel_mps2, True, rules)
         latest_mps2 = accel_mps2
         if merge.done and (
             not best.done or (merge.moved, merge.lost_s) < (best.moved, best.lost_s)
@@ -185,16 +175,7 @@ def rung_create(
     if best.done:
         proposal.trace[0, CURRENT] = best_attempt
     if best.done and best.accel_mps2 != latest_mps2:
-        return try_merge(
-            fleet,
-            proposal,
-            subject.row,
-            subject.approach,
-            best.accel_mps2,
-            True,
-            subject.known_m,
-            rules,
-        )
+        return _try_by(fleet, proposal, subject, subject.approach, best.accel_mps2, True, rules)
     return best
 
 
@@ -242,145 +223,10 @@ def come_later_by(
         if n == 0:
             refuse(proposal.trace, NO_LATE_WAY, -1, math.nan)
             continue
-        merge = try_merge(
-            fleet,
-            proposal,
-            subject.row,
-            out[:n],
-            subject.free_mps2,
-            make_room,
-            subject.known_m,
-            rules,
-        )
+        merge = _try_by(fleet, proposal, subject, out[:n], subject.free_mps2, make_room, rules)
         if merge.done:
             return merge
     return no_unequal_merge()
-
-
-@kernel
-def unequal_plan(
-    fleet: Fleet,
-    proposal: Proposal,
-    subject: Subject,
-    rung: int,
-    merge: UnequalMerge,
-    rules: Rules,
-) -> MergePlan:
-    """Returns the plan that a merge amounts to; one that is not done is a hold.
-
-    The conflict vehicle is the nearer of the two around the merge, severities are those between it
-    and the subject before and after they adapt.
-    """
-    nothing, row = math.nan, subject.row
-    note_subject(proposal.trace, subject.free_mps2, fleet.traits[row, LENGTH], nothing)
-    nose = subject.approach[len(subject.approach) - 1]
-    if not merge.done:
-        return MergePlan(
-            RUNG_HOLD,
-            0,
-            -1,
-            -1,
-            -1,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            nose[TIME],
-            nose[SPEED],
-            nothing,
-            nothing,
-            nothing,
-        )
-    front_m = rear_m = nothing
-    gap_m, needed_m = math.inf, fleet.traits[row, LENGTH]
-    conflict, nearest_m = -1, math.inf
-    for other in (merge.front_row, merge.rear_row):
-        if other < 0:
-            continue
-        ways = trajectory_under(fleet, proposal, other)
-        other_m, other_mps = station_and_speed(ways, merge.time_s)
-        along_mps = merging_speed_along_mps(merge.speed_mps, rules.road.merge_angle_rad)
-        pair = pair_safety(fleet.traits[other], fleet.traits[row], rules.safety)
-        needed_m += merge_distance_m(along_mps, other_mps, pair)
-        if other == merge.front_row:
-            front_m = other_m - fleet.traits[other, LENGTH]
-            distance_m = front_m - merge.station_m
-        else:
-            rear_m = other_m
-            distance_m = merge.station_m - fleet.traits[row, LENGTH] - rear_m
-        if distance_m < nearest_m:
-            conflict, nearest_m = other, distance_m
-    if merge.front_row >= 0 and merge.rear_row >= 0:
-        gap_m = front_m - rear_m
-    front_length_m = fleet.traits[merge.front_row, LENGTH] if merge.front_row >= 0 else nothing
-    note_choice(proposal.trace, rung, 2 if merge.moved > 0 else 0, front_length_m)
-    before = after = (nothing, nothing)
-    if conflict >= 0:
-        before = _severity(fleet, row, committed(fleet, conflict), conflict, merge, rules)
-        after_way = trajectory_under(fleet, proposal, conflict)
-        after = _severity(fleet, row, after_way, conflict, merge, rules)
-    now_s = subject.from_s - rules.control.actuation_delay_s
-    return MergePlan(
-        rung,
-        2 if merge.moved > 0 else 0,
-        conflict,
-        merge.front_row,
-        merge.rear_row,
-        gap_m,
-        needed_m,
-        merge.accel_mps2,
-        merge.time_s,
-        merge.station_m,
-        _largest_shift_m(fleet, proposal, merge),
-        before[0],
-        after[0],
-        before[1],
-        after[1],
-        nose[TIME],
-        nose[SPEED],
-        _station_now_m(fleet, conflict, now_s),
-        _station_now_m(fleet, merge.front_row, now_s),
-        _station_now_m(fleet, merge.rear_row, now_s),
-    )
-
-
-@kernel
-def _station_now_m(fleet: Fleet, row: int, now_s: float) -> float:
-    return station_and_speed(committed(fleet, row), now_s)[0] if row >= 0 else math.nan
-
-
-@kernel
-def _severity(
-    fleet: Fleet, row: int, way: FloatArray, other: int, merge: UnequalMerge, rules: Rules
-) -> tuple[float, float]:
-    """Returns J (m2/s4) at the merge with another vehicle's way, as printed and relative."""
-    other_m, other_mps = station_and_speed(way, merge.time_s)
-    along_mps = merging_speed_along_mps(merge.speed_mps, rules.road.merge_angle_rad)
-    distance_m = max(
-        other_m - fleet.traits[other, LENGTH] - merge.station_m,
-        merge.station_m - fleet.traits[row, LENGTH] - other_m,
-    )
-    masses = (fleet.traits[row, MASS], fleet.traits[other, MASS])
-    return severity_of_masses_m2ps4(along_mps, other_mps, distance_m, *masses)
-
-
-@kernel
-def _largest_shift_m(fleet: Fleet, proposal: Proposal, merge: UnequalMerge) -> float:
-    """Returns by how far (m) at most a vehicle that makes room is back when the subject merges."""
-    largest_m = 0.0
-    for entry in range(1, proposal.size[0]):
-        row = proposal.rows[entry]
-        if fleet.merge_time_s[row] < math.inf:
-            was_m, _ = station_and_speed(committed(fleet, row), merge.time_s)
-            now_m, _ = station_and_speed(trajectory_under(fleet, proposal, row), merge.time_s)
-            largest_m = max(largest_m, was_m - now_m)
-    return largest_m
 
 
 @kernel
@@ -399,6 +245,7 @@ def plan_unequal(
     """
     rules, proposal = unpacked(packed_rules), empty_proposal()
     subject = subject_of(fleet, row, now_s, fastest_entry_mps, rules)
+    note_subject(proposal.trace, subject.free_mps2, fleet.traits[row, LENGTH], math.nan)
     blocked, behind = ramp_neighbours(fleet, row, subject.from_s)
     rung, merge = RUNG_FREE, rung_free(fleet, proposal, subject, rules)
     if not merge.done and not ramp_first:
@@ -407,9 +254,14 @@ def plan_unequal(
         rung, merge = RUNG_CREATE, rung_create(fleet, proposal, subject, ramp_first, rules)
     if not merge.done:
         rung, merge = RUNG_DELAY, rung_delay(fleet, proposal, subject, rules)
+    nose = subject.approach[len(subject.approach) - 1]
     if not merge.done:
-        rung, proposal.size[0] = RUNG_HOLD, 0
-    return unequal_plan(fleet, proposal, subject, rung, merge, rules), proposal, blocked, behind
+        proposal.size[0] = 0
+        return hold_plan(nose), proposal, blocked, behind
+    front_length_m = fleet.traits[merge.front_row, LENGTH] if merge.front_row >= 0 else math.nan
+    note_choice(proposal.trace, rung, 2 if merge.moved > 0 else 0, front_length_m)
+    plan = unequal_plan(fleet, proposal, row, now_s, nose, rung, merge, rules)
+    return plan, proposal, blocked, behind
 
 
 @kernel

@@ -19,7 +19,7 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_at_station,
 )
-from coramp.motion.following import follow_safely, speed_up
+from coramp.motion.following import Leader, follow_safely, speed_up
 from coramp.motion.lane_change import ON_GRID, lane_change_s
 from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
@@ -168,9 +168,7 @@ def try_merge(
             base[:m],
             merge_s,
             merge_s,
-            committed(fleet, front),
-            fleet.merge_time_s[front],
-            fleet.traits[front],
+            Leader(committed(fleet, front), fleet.traits[front], fleet.merge_time_s[front]),
             traits,
             0.0,
             rules,
@@ -274,9 +272,7 @@ def give_way(
             before[:n],
             fleet.merge_time_s[row],
             max(from_s, fleet.merge_time_s[row]),
-            proposed(proposal, entry),
-            proposal.merge_time_s[entry],
-            fleet.traits[ahead],
+            Leader(proposed(proposal, entry), fleet.traits[ahead], proposal.merge_time_s[entry]),
             fleet.traits[row],
             most_dip_mps,
             rules,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.equations.safe_distance import standing_clearance_m
+from coramp.equations.safe_distance import safe_distance_m, standing_clearance_m
 from coramp.road.rules import MotionLimits, Road, Rules, SafetyBudget
 
 (
@@ -91,9 +91,16 @@ def pair_safety(front: FloatArray, rear: FloatArray, safety: SafetyBudget) -> Sa
 
 @kernel
 def standing_behind_m(front: FloatArray, rear: FloatArray, rules: Rules) -> float:
-    """Returns the bumper distance (m) planned between a vehicle that stops and one behind it."""
+    """Returns the bumper distance (m) planned between a vehicle that stops and one behind it.
+
+    It does for one that brakes to its stop, and once the one ahead starts with a: by then its clock
+    error e asks for e a t, of which a t^2 / 2 come about, so that e^2 a / 2 must be there before.
+    """
     stop_mps2 = min(rules.motion.stop_mps2, rear[BRAKING])
-    return standing_clearance_m(rules.road, pair_safety(front, rear, rules.safety), stop_mps2)
+    safety = pair_safety(front, rear, rules.safety)
+    still_m = safe_distance_m(0.0, 0.0, safety) + safety.execution_allowance_m
+    starts_m = still_m + 0.5 * front[CLOCK] ** 2 * rules.motion.speed_up_mps2
+    return float(max(standing_clearance_m(rules.road, safety, stop_mps2), starts_m))
 
 
 @kernel
