@@ -98,6 +98,9 @@ class Tried(Sequence[Attempt]):
     def __hash__(self) -> int:
         return hash(self._trace.tobytes())
 
+    def __repr__(self) -> str:
+        return f"Tried({list(self)!r})"
+
     @overload
     def __getitem__(self, place: int) -> Attempt: ...
     @overload
