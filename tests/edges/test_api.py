@@ -28,6 +28,7 @@ SCHEMAS = {
     "speeds": SPEEDS,
     "trajectories": TRAJECTORIES,
     "decisions": DECISIONS,
+    "attempts": ATTEMPTS,
     "positions": TRAJECTORIES,
     "violations": VIOLATIONS,
     "attempts": ATTEMPTS,

@@ -179,7 +179,7 @@ def test_a_run_leaves_exactly_what_is_promised(kept, uncontrolled):
     sumo_files = ["sumo", *(f"sumo/{name}" for name in SUMO_FILES)]
     tables = [f"{name}.parquet" for name in TABLES]
     assert everything_below(kept.folder) == sorted(
-        ["run.json", "violations.parquet", *tables, *sumo_files]
+        ["run.json", "attempts.parquet", "violations.parquet", *tables, *sumo_files]
     )
     assert everything_below(uncontrolled.folder) == sorted([*UNCONTROLLED_FILES, *sumo_files])
 

@@ -202,7 +202,7 @@ class TestRunFolder:
         (ours / "sumo" / "routes.rou.xml").write_text("<routes/>")
         assert invoke(*RUN, "--seed", "2", "--out", "r").code == 0
         assert json.loads((ours / "run.json").read_text())["seed"] == 2
-        tables = ("decisions", "speeds", "trajectories", "vehicles", "violations")
+        tables = ("attempts", "decisions", "speeds", "trajectories", "vehicles", "violations")
         assert everything_below(ours) == sorted(["run.json", *(f"{t}.parquet" for t in tables)])
 
     @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ class TestRunFolder:
         monkeypatch.chdir(ours)
         assert invoke(*RUN, "--seed", "2", "--out", ".").code == 0
         assert json.loads(Path("run.json").read_text())["seed"] == 2
-        assert everything_below(ours.parent.resolve())[0] == "decisions.parquet"
+        assert everything_below(ours.parent.resolve())[0] == "attempts.parquet"
 
     def test_tables_without_a_study_are_left_alone(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
