@@ -270,15 +270,16 @@ coramp.Road = class {
   name(ctx, row, { i, station, speed }, onMainline) {
     const middle = station - 0.5 * this.run.length[i];
     this.tag(ctx, row, `${this.run.ids[i]}, ${coramp.kmh(speed)}`, this.x(row, middle),
-      this.y(row, station, onMainline));
+      this.y(row, station, onMainline), onMainline);
   }
 
-  // A line of text above what is at a place, within the picture.
-  tag(ctx, row, text, x, y) {
+  // A line of text above what is at a place, or below it, within the picture.
+  tag(ctx, row, text, x, y, above = true) {
     ctx.font = '600 12px system-ui, sans-serif';
     const wide = ctx.measureText(text).width + 8;
     const left = Math.min(Math.max(0, x - 0.5 * wide), this.canvas.clientWidth - wide);
-    const top = Math.max(row.top, y - 0.5 * this.lane - 15);
+    const top = above ? Math.max(row.top, y - 0.5 * this.lane - 15)
+      : Math.min(row.top + row.high - 15, y + 0.5 * this.lane);
     ctx.fillStyle = coramp.colour('page');
     ctx.fillRect(left, top, wide, 15);
     ctx.fillStyle = coramp.colour('text');
