@@ -111,7 +111,9 @@ def test_the_play_bar_is_in_sight_and_vehicles_are_big(browser, folders, width, 
         assert page.evaluate("5 * coramp.shown.replay.panels[0].road.scale") >= 14.0
         canvas = page.locator("canvas[role=img]").first.bounding_box()
         assert canvas["width"] > 0.92 * width
-        first_ms = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+        first_ms = page.evaluate(
+            "performance.getEntriesByName('first-contentful-paint')[0].startTime"
+        )
         assert first_ms < 1000.0
 
 
