@@ -71,6 +71,6 @@ coramp.replayLegend = (run, cooperative) => {
     item('from-ramp', 'white dot: came by the ramp'),
     item('slow', `red road: slow traffic (mainline below ${coramp.kmh(slow)})`),
     item('stopped', 'ring: stands'),
-    cooperative ? item('place', 'dashed: the place on the mainline that a ramp vehicle will take') : null,
+    cooperative ? item('place', 'dashed: the place on the mainline that a ramp vehicle will take, and keep free') : null,
     item('safe', 'green ahead of a vehicle: its safe distance, red where it is nearer'));
 };

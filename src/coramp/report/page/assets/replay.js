@@ -50,7 +50,10 @@ coramp.Replay = class {
     this.buildControls();
     this.place = element('div', { class: 'replay', role: 'group', tabindex: 0, 'aria-label': `Replay. ${coramp.Replay.KEYS}` });
     this.panels = this.runs.map((run) => this.panel(run));
-    const cooperative = this.runs.some((run) => run.decisions.length > 0);
+    const deciding = this.panels.filter(({ run }) => run.decisions.length > 0);
+    this.place.append(...deciding.map(({ run, log }) => element('div', { class: 'latest' },
+      element('p', {}, `Latest decisions, ${run.title}`), log)));
+    const cooperative = deciding.length > 0;
     this.legend = coramp.replayLegend(this.runs[0], cooperative);
     this.box.append(this.place, this.legend,
       element('p', { class: 'hint' }, 'Lengths are to scale. Everyone drives to the right; the road goes on in the '
@@ -100,8 +103,7 @@ coramp.Replay = class {
     const log = element('ol', { class: 'log' });
     const panel = { run, road: new coramp.Road(run, canvas), canvas, delay, state, log };
     this.place.append(element('figure', {},
-      element('figcaption', {}, element('span', {}, run.title), delay), canvas, state,
-      ...(run.decisions.length ? [log] : [])));
+      element('figcaption', {}, element('span', {}, run.title), delay), canvas, state));
     return panel;
   }
 
