@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from coramp.kinematics.trajectory import intercept_range_m
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget
 from coramp.vehicles.fleet import Fleet
+from coramp.vehicles.traits import Traits
 
 PACKAGES = ("equations", "kinematics", "motion", "road", "vehicles")
 """The folders that hold mathematics alone."""
@@ -144,7 +145,13 @@ def sampled_margins(front, front_length_m, rear, times_s, safety):
     )
 
 
-def fleet_of(*vehicles, live=None):
+def sized(length_m=5.0, safety=SAFETY, **own):
+    """What a vehicle of a length can do: only the common limits bind it, but for ``own``."""
+    usual = Traits(length_m, safety.positioning_error_m, safety.clock_error_s, safety.time_gap_s)
+    return np.array(usual._replace(**own))
+
+
+def fleet_of(*vehicles, live=None, safety=SAFETY):
     """Commitments of ``(pieces, merge time)``, 5 m long unless a length follows."""
     rows = [vehicle[0] for vehicle in vehicles]
     counts = [len(row) for row in rows]
@@ -155,7 +162,7 @@ def fleet_of(*vehicles, live=None):
         piece_count=np.array(counts),
         length_m=np.array([vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]),
         merge_time_s=np.array([vehicle[1] for vehicle in vehicles]),
-        lowest_m=np.array([low_m for low_m, _ in ranges]),
-        highest_m=np.array([high_m for _, high_m in ranges]),
+        intercepts_m=np.array(ranges),
+        traits=np.array([sized(v[2] if len(v) > 2 else 5.0, safety) for v in vehicles]),
         live=np.arange(len(rows)) if live is None else np.array(live),
     )

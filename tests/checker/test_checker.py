@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from coramp.checker.checker import Change, examine
-from coramp.checker.pairs import Way, envelope_on_mainline, examine_pair, surely_apart
+from coramp.checker.pairs import envelope_on_mainline, examine_pair, surely_apart, way_with
 from coramp.checker.reasons import (
     ACCEPTED,
     BACKWARDS,
@@ -34,7 +34,7 @@ from coramp.checker.reasons import (
 )
 from coramp.checker.record import LIVE, empty_record, note_entry
 from tests.checker.test_distances import BOUNDS
-from tests.mathematics import close, pieces, sampled
+from tests.mathematics import close, pieces, sampled, sized
 
 STREAM, UNDECIDED = -math.inf, math.inf
 X, Y, R, Q = range(4)
@@ -62,11 +62,15 @@ def traffic(*vehicles, live=None):
     record = empty_record(len(vehicles) + 1, 1000)
     for vehicle in vehicles:
         length_m = vehicle[2] if len(vehicle) > 2 else 5.0
-        note_entry(record, length_m, vehicle[1], vehicle[0], BOUNDS.zone_end_m)
+        note_entry(record, sized(length_m), vehicle[1], vehicle[0], BOUNDS.zone_end_m)
     if live is not None:
         record.live[: len(live)] = live
         record.used[LIVE] = len(live)
     return record
+
+
+def _way(way, merge_s):
+    return way_with(way, merge_s, sized())
 
 
 ROAD = ((X_WAY, STREAM), (Y_WAY, STREAM), (R_WAY, UNDECIDED), (Q_WAY, UNDECIDED))
@@ -712,7 +716,9 @@ def test_pair_is_only_skipped_if_its_margin_is_not_the_least():
     rng = np.random.default_rng(9)
     skipped = 0
     for _ in range(200):
-        ways = [Way(way, length_m, merge_s) for way, merge_s, length_m in _busy_traffic(rng)]
+        ways = [
+            way_with(way, merge_s, sized(length_m)) for way, merge_s, length_m in _busy_traffic(rng)
+        ]
         for mine, theirs in zip(ways[::2], ways[1::2], strict=True):
             code, margin_m = examine_pair(mine, theirs, 1.0, BOUNDS)
             if code != ACCEPTED:
@@ -725,7 +731,7 @@ def test_pair_is_only_skipped_if_its_margin_is_not_the_least():
 
 
 def test_pair_that_never_meets_on_the_mainline_is_skipped_and_one_on_the_ramp_is_not():
-    undecided, other = Way(R_WAY, 5.0, UNDECIDED), Way(Q_WAY, 5.0, UNDECIDED)
-    assert _apart(undecided, Way(X_WAY, 5.0, STREAM), math.inf)
+    undecided, other = _way(R_WAY, UNDECIDED), _way(Q_WAY, UNDECIDED)
+    assert _apart(undecided, _way(X_WAY, STREAM), math.inf)
     assert not _apart(undecided, other, -math.inf)
-    assert not _apart(Way(MERGE, 5.0, 12.0), other, -math.inf)
+    assert not _apart(_way(MERGE, 12.0), other, -math.inf)

@@ -1,6 +1,7 @@
 """The checker's own distances: by hand, against sampling, and against the planner's formulas."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from coramp.checker.distances import (
     Bounds,
     Envelope,
+    Needs,
     envelope_of,
     following_distance_m,
     lane_change_distance_m,
@@ -39,26 +41,62 @@ BOUNDS = Bounds(
     mainline_speed_mps=20.0,
     ramp_limit_mps=17.0,
     cos_merge_angle=0.8660254037844386,
-    positioning_error_m=0.02,
-    clock_error_s=3e-9,
     friction=0.51,
-    time_gap_s=0.0,
     standstill_gap_m=0.0,
     allowance_m=0.1,
     comfort_mps2=2.94,
     ramp_acceleration_mps2=6.0,
     gap_speed_factor=1.1,
 )
+
+
+class Budget(NamedTuple):
+    """The checker's bounds, with the errors and the time gap of vehicles that are alike."""
+
+    bounds: Bounds = BOUNDS
+    positioning_error_m: float = 0.02
+    clock_error_s: float = 3e-9
+    time_gap_s: float = 0.0
+
+    def needs(self, front_length_m=0.0):
+        clock_s = self.clock_error_s
+        errors_m = 2.0 * self.positioning_error_m
+        return Needs(front_length_m, errors_m, clock_s, clock_s, self.time_gap_s)
+
+
+BUDGET = Budget()
 # errors large enough to be seen, in the words of the checker and of the planners
-WIDE = {
-    "positioning_error_m": 0.3,
-    "clock_error_s": 0.05,
-    "time_gap_s": 0.4,
-    "standstill_gap_m": 1.5,
-}
-WIDE_BOUNDS = BOUNDS._replace(**WIDE)
-WIDE_SAFETY = SAFETY._replace(**WIDE)
-BUDGETS = st.sampled_from([(BOUNDS, SAFETY), (WIDE_BOUNDS, WIDE_SAFETY)])
+ERRORS = {"positioning_error_m": 0.3, "clock_error_s": 0.05, "time_gap_s": 0.4}
+WIDE_BUDGET = Budget(BOUNDS._replace(standstill_gap_m=1.5), **ERRORS)
+WIDE_SAFETY = SAFETY._replace(**ERRORS, standstill_gap_m=1.5)
+
+
+def following_m(front_mps, rear_mps, budget):
+    return following_distance_m(front_mps, rear_mps, budget.needs(), budget.bounds)
+
+
+def lane_change_m(merging_mps, other_mps, budget):
+    errors_m = 2.0 * budget.positioning_error_m
+    return lane_change_distance_m(merging_mps, other_mps, errors_m, budget.bounds)
+
+
+def at_m(front, length_m, rear, time_s, budget):
+    return margin_at_m(front, rear, time_s, budget.needs(length_m), budget.bounds)
+
+
+def between_m(front, length_m, rear, start_s, end_s, budget):
+    return least_between_m(front, rear, start_s, end_s, budget.needs(length_m), budget.bounds)
+
+
+def least_m(front, length_m, rear, start_s, end_s, budget):
+    return least_margin_m(front, rear, start_s, end_s, budget.needs(length_m), budget.bounds)
+
+
+def at_least_m(front, length_m, rear, budget):
+    return margin_at_least_m(front, rear, budget.needs(length_m), budget.bounds)
+
+
+BUDGETS = st.sampled_from([(BUDGET, SAFETY), (WIDE_BUDGET, WIDE_SAFETY)])
 
 # 10 m/s for 3 s, up to 20 m/s in 5 s (75 m), down to a stand in 10 s (100 m)
 WAY = np.array(
@@ -132,74 +170,74 @@ def test_passing_time_is_the_first_at_the_station(way, share):
 
 def test_following_distance_by_hand():
     # 0.04 + 3e-9 * 37, and 10.8^2 / 129.54 for the faster follower
-    assert following_distance_m(20.0, 17.0, BOUNDS) == close(0.040000111)
-    assert following_distance_m(17.0, 20.0, BOUNDS) == close(0.9404169706572487)
+    assert following_m(20.0, 17.0, BUDGET) == close(0.040000111)
+    assert following_m(17.0, 20.0, BUDGET) == close(0.9404169706572487)
     # 0.36^2 / 129.54
-    assert following_distance_m(19.9, 20.0, BOUNDS) == close(0.041000582877397)
+    assert following_m(19.9, 20.0, BUDGET) == close(0.041000582877397)
     # 0.6 + 0.05 * 37 + 0.4 * 20 + 1.5, and the same
-    assert following_distance_m(17.0, 20.0, WIDE_BOUNDS) == close(12.850416859657248)
+    assert following_m(17.0, 20.0, WIDE_BUDGET) == close(12.850416859657248)
 
 
 def test_lane_change_distance_by_hand():
-    assert lane_change_distance_m(20.0, 20.0, BOUNDS) == close(0.7583002436540073)
-    assert lane_change_distance_m(20.0, 18.0, BOUNDS) == close(0.0861923128504408)
+    assert lane_change_m(20.0, 20.0, BUDGET) == close(0.7583002436540073)
+    assert lane_change_m(20.0, 18.0, BUDGET) == close(0.0861923128504408)
     # a slower one counts alike: 20 cos 30 less 14.6410.. either way
-    assert lane_change_distance_m(20.0, 14.641016151377545, BOUNDS) == close(0.7583002436540073)
-    assert lane_change_distance_m(20.0, 20.0, WIDE_BOUNDS) == close(1.3183002436540073)
+    assert lane_change_m(20.0, 14.641016151377545, BUDGET) == close(0.7583002436540073)
+    assert lane_change_m(20.0, 20.0, WIDE_BUDGET) == close(1.3183002436540073)
 
 
 def test_margin_at_a_moment_by_hand():
     front, rear = pieces(0.0, 30.0, 17.0), pieces(0.0, 0.0, 20.0)
     # at 2 s: 64 - 5 - 40 m
-    assert margin_at_m(front, 5.0, rear, 2.0, BOUNDS) == close(19.0 - 0.9404169706572487)
+    assert at_m(front, 5.0, rear, 2.0, BUDGET) == close(19.0 - 0.9404169706572487)
 
 
 def test_least_between_is_at_the_start_of_an_opening_and_at_the_end_of_a_closing_span():
     front, rear = pieces(0.0, 100.0, 20.0), pieces(0.0, 0.0, 16.0, [(24.0, 8.0)])
     # opening up to 4 s: 95 m at first
-    assert least_between_m(front, 5.0, rear, 0.0, 4.0, BOUNDS) == close(94.96 - 3e-9 * 36.0)
+    assert between_m(front, 5.0, rear, 0.0, 4.0, BUDGET) == close(94.96 - 3e-9 * 36.0)
     # 95 m again at 8 s, less 14.4^2 / 129.54
     at_end = 95.0 - 0.04 - 3e-9 * 44.0 - 207.36 / 129.54
-    assert least_between_m(front, 5.0, rear, 4.0, 8.0, BOUNDS) == close(at_end)
+    assert between_m(front, 5.0, rear, 4.0, 8.0, BUDGET) == close(at_end)
     # closing ever less: by 8 m up to 4 s
     braking = pieces(0.0, 0.0, 24.0, [(20.0, 4.0)])
-    assert least_between_m(front, 5.0, braking, 0.0, 4.0, BOUNDS) == close(86.96 - 3e-9 * 40.0)
+    assert between_m(front, 5.0, braking, 0.0, 4.0, BUDGET) == close(86.96 - 3e-9 * 40.0)
 
 
 def test_vertex_inside_the_span_is_found():
     # the follower's time gap shrinks as it brakes: 100 - 4 t + t^2 / 2 + 2 t - (4 - t)^2 kappa
     front, rear = pieces(0.0, 105.0, 20.0), pieces(0.0, 0.0, 24.0, [(20.0, 4.0)])
-    bounds = BOUNDS._replace(time_gap_s=2.0, clock_error_s=0.0)
+    bounds = BUDGET._replace(time_gap_s=2.0, clock_error_s=0.0)
     kappa = 12.96 / 129.54
     t = (2.0 - 8.0 * kappa) / (1.0 - 2.0 * kappa)
     least = 100.0 - 4.0 * t + t * t / 2.0 - 2.0 * (24.0 - t) - 0.04 - kappa * (4.0 - t) ** 2
     assert 1.0 < t < 2.0
-    assert least_between_m(front, 5.0, rear, 0.0, 4.0, bounds) == close(least)
-    assert least_between_m(front, 5.0, rear, 1.0, 2.0, bounds) == close(least)
+    assert between_m(front, 5.0, rear, 0.0, 4.0, bounds) == close(least)
+    assert between_m(front, 5.0, rear, 1.0, 2.0, bounds) == close(least)
 
 
 def test_closing_in_for_ever_has_no_least_margin():
     front, rear = pieces(0.0, 500.0, 19.0), pieces(0.0, 0.0, 20.0)
-    assert least_margin_m(front, 5.0, rear, 0.0, math.inf, BOUNDS) == -math.inf
+    assert least_m(front, 5.0, rear, 0.0, math.inf, BUDGET) == -math.inf
     # after 100 s: 495 - 100 - 0.04 - 3e-9 * 39 - 3.6^2 / 129.54
-    assert least_margin_m(front, 5.0, rear, 0.0, 100.0, BOUNDS) == close(394.85995348721954)
+    assert least_m(front, 5.0, rear, 0.0, 100.0, BUDGET) == close(394.85995348721954)
     speeding_up = np.array([[0.0, 0.0, 20.0, 0.1]])
     cruising = pieces(0.0, 500.0, 20.0)
-    assert least_margin_m(cruising, 5.0, speeding_up, 0.0, math.inf, BOUNDS) == -math.inf
+    assert least_m(cruising, 5.0, speeding_up, 0.0, math.inf, BUDGET) == -math.inf
 
 
 def test_cruising_together_for_ever_keeps_the_distance():
     front, rear = pieces(0.0, 50.0, 20.0), pieces(0.0, 0.0, 20.0)
-    assert least_margin_m(front, 5.0, rear, 0.0, math.inf, BOUNDS) == close(44.95999988)
+    assert least_m(front, 5.0, rear, 0.0, math.inf, BUDGET) == close(44.95999988)
     faster = pieces(0.0, 50.0, 21.0)
     # 45 - 0.04 - 3e-9 * 41
-    assert least_margin_m(faster, 5.0, rear, 0.0, math.inf, BOUNDS) == close(44.959999877)
+    assert least_m(faster, 5.0, rear, 0.0, math.inf, BUDGET) == close(44.959999877)
 
 
 def test_empty_span_has_no_margin():
     front, rear = pieces(0.0, 50.0, 20.0), pieces(0.0, 0.0, 20.0)
-    assert least_margin_m(front, 5.0, rear, 3.0, 2.0, BOUNDS) == math.inf
-    assert least_margin_m(front, 5.0, rear, 3.0, 3.0, BOUNDS) == close(44.95999988)
+    assert least_m(front, 5.0, rear, 3.0, 2.0, BUDGET) == math.inf
+    assert least_m(front, 5.0, rear, 3.0, 3.0, BUDGET) == close(44.95999988)
 
 
 @settings(max_examples=100, deadline=None)
@@ -215,7 +253,7 @@ def test_empty_span_has_no_margin():
     pieces(0.0, 0.0, 10.0, [(0.0, 5.0)]),
     0.0,
     5.0,
-    (WIDE_BOUNDS, WIDE_SAFETY),
+    (WIDE_BUDGET, WIDE_SAFETY),
 )
 def test_least_margin_agrees_with_sampling_and_with_the_planners(
     front, rear, after_s, lasts_s, budget
@@ -225,7 +263,7 @@ def test_least_margin_agrees_with_sampling_and_with_the_planners(
 
 
 @pytest.mark.parametrize(
-    "budget", [(BOUNDS, SAFETY), (WIDE_BOUNDS, WIDE_SAFETY)], ids=["paper", "wide"]
+    "budget", [(BUDGET, SAFETY), (WIDE_BUDGET, WIDE_SAFETY)], ids=["paper", "wide"]
 )
 def test_least_margin_of_busy_pairs_agrees_with_sampling_and_with_the_planners(budget):
     for front, rear, start_s, lasts_s in random_pairs(2, 200):
@@ -233,15 +271,15 @@ def test_least_margin_of_busy_pairs_agrees_with_sampling_and_with_the_planners(b
 
 
 def _assert_agreement(front, rear, start_s, end_s, budget):
-    bounds, safety = budget
-    least_m = least_margin_m(front, 4.5, rear, start_s, end_s, bounds)
+    checked, safety = budget
+    found_m = least_m(front, 4.5, rear, start_s, end_s, checked)
     planned_m, when_s = smallest_margin_m(front, 4.5, rear, start_s, end_s, safety)
-    assert least_m == pytest.approx(planned_m, abs=1e-7)
+    assert found_m == pytest.approx(planned_m, abs=1e-7)
     knots_s = np.concatenate([front[:, 0], rear[:, 0], [when_s]])
     knots_s = knots_s[(knots_s >= start_s) & (knots_s <= end_s)]
     times_s = np.concatenate([np.linspace(start_s, end_s, 3001), knots_s])
     samples_m = sampled_margins(front, 4.5, rear, times_s, safety)
-    assert least_m == pytest.approx(samples_m.min(), abs=1e-7)
+    assert found_m == pytest.approx(samples_m.min(), abs=1e-7)
 
 
 @settings(max_examples=60, deadline=None)
@@ -251,13 +289,13 @@ def _assert_agreement(front, rear, start_s, end_s, budget):
     budget=BUDGETS,
 )
 def test_least_margin_for_ever_agrees_with_the_planners(front, rear, budget):
-    bounds, safety = budget
+    checked, safety = budget
     assume(rear[-1, 2] <= 20.0)
     start_s = max(front[0, 0], rear[0, 0])
-    least_m = least_margin_m(front, 4.5, rear, start_s, math.inf, bounds)
+    found_m = least_m(front, 4.5, rear, start_s, math.inf, checked)
     planned_m, _ = smallest_margin_m(front, 4.5, rear, start_s, math.inf, safety)
-    assert least_m == pytest.approx(planned_m, abs=1e-7)
-    assert math.isfinite(least_m)
+    assert found_m == pytest.approx(planned_m, abs=1e-7)
+    assert math.isfinite(found_m)
 
 
 # envelopes ----------------------------------------------------------------------------------
@@ -304,16 +342,16 @@ def test_margin_at_least_by_hand():
     front, rear = Envelope(100.0, 110.0, 18.0, 21.0), Envelope(60.0, 70.0, 19.0, 22.0)
     # the lane change at 18 m/s beside 22 m/s: (3.6 (22 - 18 cos 30))^2 / 129.54 and 0.04
     needed_m = 0.04 + (3.6 * (22.0 - 15.588457268119896)) ** 2 / 129.54
-    assert margin_at_least_m(front, 5.0, rear, BOUNDS) == close(25.0 - needed_m)
+    assert at_least_m(front, 5.0, rear, BUDGET) == close(25.0 - needed_m)
     # with both gaps Eq. 1: 0.6 + 0.05 (18 + 22 + 3) + 14.4^2 / 129.54 + 0.4 * 22 + 1.5
-    following_m = 0.6 + 2.15 + 207.36 / 129.54 + 8.8 + 1.5
-    assert margin_at_least_m(front, 5.0, rear, WIDE_BOUNDS) == close(25.0 - following_m)
+    needed = 0.6 + 2.15 + 207.36 / 129.54 + 8.8 + 1.5
+    assert at_least_m(front, 5.0, rear, WIDE_BUDGET) == close(25.0 - needed)
     # slow in front and fast behind, or the other way round, asks the same of a lane change
     front, rear = Envelope(100.0, 110.0, 19.0, 22.0), Envelope(60.0, 70.0, 18.0, 21.0)
-    assert margin_at_least_m(front, 5.0, rear, BOUNDS) == close(25.0 - needed_m)
+    assert at_least_m(front, 5.0, rear, BUDGET) == close(25.0 - needed_m)
 
 
-@pytest.mark.parametrize("bounds", [BOUNDS, WIDE_BOUNDS], ids=["paper", "wide"])
+@pytest.mark.parametrize("bounds", [BUDGET, WIDE_BUDGET], ids=["paper", "wide"])
 def test_no_margin_falls_below_that_of_the_envelopes(bounds):
     for front, rear, from_s, lasts_s in random_pairs(7, 100):
         front[:, 1] += 200.0
@@ -325,11 +363,11 @@ def test_no_margin_falls_below_that_of_the_envelopes(bounds):
             envelopes.append(
                 Envelope(moving_m.min(), moving_m.max(), speeds_mps.min(), speeds_mps.max())
             )
-        at_least_m = margin_at_least_m(envelopes[0], 4.5, envelopes[1], bounds)
+        bound_m = at_least_m(envelopes[0], 4.5, envelopes[1], bounds)
         for time_s in times_s[::50]:
-            assert at_least_m <= margin_at_m(front, 4.5, rear, time_s, bounds) + 1e-9
+            assert bound_m <= at_m(front, 4.5, rear, time_s, bounds) + 1e-9
             front_m, front_mps, _ = state_at(front, time_s)
             rear_m, rear_mps, _ = state_at(rear, time_s)
             for merging_mps, other_mps in ((front_mps, rear_mps), (rear_mps, front_mps)):
-                asked_m = lane_change_distance_m(merging_mps, other_mps, bounds)
-                assert at_least_m <= front_m - 4.5 - rear_m - asked_m + 1e-9
+                asked_m = lane_change_m(merging_mps, other_mps, bounds)
+                assert bound_m <= front_m - 4.5 - rear_m - asked_m + 1e-9

@@ -16,7 +16,7 @@ MODULES = [
     "coramp.messages.commands",
     "coramp.messages.events",
 ]
-UNITS = re.compile(r"_(m|s|mps|mps2|mps3|m2ps4|mlps|l|kg|rad|deg|veh_h)$")
+UNITS = re.compile(r"_(m|s|mps|mps2|mps3|m2ps4|mlps|l|kg|wpkg|rad|deg|veh_h)$")
 DIMENSIONLESS = {
     "adhesion",
     "resistance",

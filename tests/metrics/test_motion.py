@@ -38,7 +38,8 @@ def one(*rows):
 
 def fuel(pieces, until):
     first, rows = pieces
-    return fuel_of_each_l(first, rows, np.array([float(until)]))[0]
+    car = np.zeros(1, np.int64), np.array([1500.0])
+    return fuel_of_each_l(first, rows, np.array([float(until)]), *car)[0]
 
 
 def test_a_cruise_burns_what_the_table_says():
@@ -83,7 +84,7 @@ def test_fuel_and_distance_are_each_vehicles_own():
     rows = np.array([[0.0, 0.0, 10.0, 2.0], [5.0, 75.0, 20.0, 0.0], [1.0, 50.0, 15.0, -1.0]])
     until = np.array([7.0, 9.0, 4.0])
     np.testing.assert_allclose(
-        fuel_of_each_l(first, rows, until),
+        fuel_of_each_l(first, rows, until, np.zeros(len(until), np.int64), np.ones(len(until))),
         [fuel_l(10.0, 2.0, 5.0) + fuel_l(20.0, 0.0, 2.0), 0.0, fuel_l(15.0, -1.0, 3.0)],
     )
     np.testing.assert_allclose(

@@ -16,9 +16,10 @@ def test_packing_and_unpacking_gives_the_same_rules():
 
 
 def test_every_number_has_a_place_of_its_own():
-    numbers = np.arange(32.0)
+    numbers = np.arange(35.0)
     rules = unpacked(numbers)
     assert isinstance(rules, Rules)
-    assert [float(value) for part in rules for value in part][:30] == numbers[:30].tolist()
+    assert [float(value) for part in rules for value in part][:31] == numbers[:31].tolist()
     assert (rules.control.gap_at_front, rules.control.create_from_nose) == (True, True)
-    assert len(packed(RULES)) == 32
+    assert rules.traffic == (True, 34.0)
+    assert len(packed(RULES)) == 35

@@ -20,6 +20,7 @@ from coramp.strategies.feedback import (
 )
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.virtual_platoon import VirtualPlatoon
+from tests.mathematics import sized
 
 RULES = load_scenario("paper").rules()
 LENGTH_M = 5.0
@@ -44,7 +45,7 @@ def on_the_road(*vehicles):
     """The platoon of vehicles ``(stream, station, speed)`` that cruise or, on the ramp, stop."""
     ledger = Ledger(20.0, 400.0)
     for stream, station_m, speed_mps in vehicles:
-        row = add_row(ledger.book, LENGTH_M, stream == "r")
+        row = add_row(ledger.book, sized(LENGTH_M), stream == "r")
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
         ledger.commit(row, pieces, math.inf if stream == "r" else -math.inf, 0.0)
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))

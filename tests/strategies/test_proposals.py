@@ -305,10 +305,10 @@ def test_unsafe_pairs_are_found_though_far_ones_are_skipped():
 def _margin_m(fleet, proposal, row, other, from_s):
     return pair_margin_m(
         trajectory_under(fleet, proposal, row),
-        fleet.length_m[row],
+        fleet.traits[row],
         merge_time_under_s(fleet, proposal, row),
         trajectory_under(fleet, proposal, other),
-        fleet.length_m[other],
+        fleet.traits[other],
         merge_time_under_s(fleet, proposal, other),
         from_s,
         RULES,

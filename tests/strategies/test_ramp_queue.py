@@ -15,7 +15,7 @@ from coramp.strategies.ramp_queue import (
     propose_stop,
 )
 from coramp.vehicles.fleet import MAX_CHANGED, empty_proposal, pair_margin_m
-from tests.mathematics import RULES, close, fleet_of, pieces, sampled
+from tests.mathematics import RULES, close, fleet_of, pieces, sampled, sized
 
 UNDECIDED = math.inf
 
@@ -68,13 +68,18 @@ def test_full_proposal_takes_no_stop():
     assert not propose_place_ahead(fleet, proposal, 0, -10.0, 0.0, RULES)
 
 
+def _margin_m(leader, follower, rules):
+    row = sized(5.0, rules.safety)
+    return pair_margin_m(leader, row, math.inf, follower, row, math.inf, 0.0, rules)
+
+
 def _brake_margin_m(leader, station_m, stop_m, steps):
     """Margin of a vehicle behind ``leader`` that first brakes for that many steps."""
     out = np.empty((20, 4))
     n = harmonise(out, 0.0, station_m, 16.0, 0.0, steps * 0.1, 16.0, RULES.motion)
     n = append_stop(out, n, stop_m, RULES.motion.stop_mps2)
     assert n > 0
-    return pair_margin_m(leader, 5.0, math.inf, out[:n], 5.0, math.inf, 0.0, RULES)
+    return _margin_m(leader, out[:n], RULES)
 
 
 @settings(max_examples=25, deadline=None)
@@ -92,7 +97,7 @@ def test_brake_before_the_stop_is_the_shortest_that_keeps_the_distance(headway_m
         return
     proposed = _proposed(proposal)
     assert proposed[-1, 1:3].tolist() == [stop_m, 0.0]
-    margin_m = pair_margin_m(leader, 5.0, math.inf, proposed, 5.0, math.inf, 0.0, RULES)
+    margin_m = _margin_m(leader, proposed, RULES)
     assert margin_m >= 0.1 - 1e-9
     steps = round((16.0 - proposed[1, 2]) / 0.2) if proposed[0, 3] == -2.0 else 0
     assume(steps > 0)
@@ -127,7 +132,7 @@ def test_vehicle_of_a_queue_that_starts_waits_until_the_time_gap_has_come_about(
     cruise_s = (329.0 - 0.75 * start_s**2 - 51.2) / 16.0
     leader = pieces(0.0, -330.0, 0.0, [(16.0, start_s), (16.0, cruise_s), (0.0, 6.4)])
     assert leader[-1, 1] == close(-1.0)
-    fleet = fleet_of((leader, UNDECIDED), (standing(-338.74), UNDECIDED))
+    fleet = fleet_of((leader, UNDECIDED), (standing(-338.74), UNDECIDED), safety=rules.safety)
     proposal = empty_proposal()
     assert propose_place_ahead(fleet, proposal, 1, -40.0, 0.0, rules)
     expected = [
@@ -137,7 +142,7 @@ def test_vehicle_of_a_queue_that_starts_waits_until_the_time_gap_has_come_about(
     ]
     assert _proposed(proposal)[:3] == close(np.array(expected))
     assert _proposed(proposal)[-1, 1:3].tolist() == [-40.0, 0.0]
-    margin_m = pair_margin_m(leader, 5.0, math.inf, _proposed(proposal), 5.0, math.inf, 0.0, rules)
+    margin_m = _margin_m(leader, _proposed(proposal), rules)
     assert margin_m == close(0.1 + 0.4)  # 16 (0.8 - 0.775)
 
 
@@ -174,7 +179,7 @@ def test_place_ahead_brakes_where_someone_is_in_the_way():
     proposed = _proposed(proposal)
     assert proposed[0, 3] == -2.0
     assert proposed[-1, 1] == -6.2
-    margin_m = pair_margin_m(leader, 5.0, math.inf, proposed, 5.0, math.inf, 0.0, RULES)
+    margin_m = _margin_m(leader, proposed, RULES)
     assert margin_m >= 0.1 - 1e-9
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coramp.vehicles.fleet import (
+    PairSafety,
     committed,
     empty_proposal,
     entry_of,
@@ -19,7 +20,7 @@ from coramp.vehicles.fleet import (
     proposed,
     trajectory_under,
 )
-from tests.mathematics import RULES, close, fleet_of, pieces
+from tests.mathematics import RULES, close, fleet_of, pieces, sized
 
 A = pieces(0.0, -160.0, 16.0, [(16.0, 10.0), (20.0, 2.0)])
 X = pieces(0.0, -189.0, 20.0)
@@ -29,7 +30,20 @@ EQ_15_20 = 0.7583002436540073  # L_r-X at 20 m/s
 
 
 def _pair(one, one_merge_s, other, other_merge_s, from_s=0.0, rules=RULES):
-    return pair_margin_m(one, 5.0, one_merge_s, other, 5.0, other_merge_s, from_s, rules)
+    row = sized(5.0, rules.safety)
+    return pair_margin_m(one, row, one_merge_s, other, row, other_merge_s, from_s, rules)
+
+
+def _ordered(one, one_length_m, other, other_length_m, start_s, end_s):
+    safety = PairSafety(RULES.safety, RULES.safety)
+    return ordered_margin_m(
+        one, one_length_m, other, other_length_m, start_s, end_s, RULES.road, safety
+    )
+
+
+def _at_merge(merging, merging_length_m, other, other_length_m, merge_s):
+    lengths = (merging, merging_length_m, other, other_length_m)
+    return merge_margin_m(*lengths, merge_s, RULES.road, RULES.safety)
 
 
 def test_trajectories_and_merge_times_are_the_proposed_ones_where_there_are():
@@ -54,31 +68,31 @@ def test_trajectories_and_merge_times_are_the_proposed_ones_where_there_are():
 
 def test_ordered_margin_takes_whoever_is_ahead_for_the_leader():
     expected = close(52.0 - 28.0 - 4.0 + 3.0 - 0.04 - 3e-9 * 40.0)  # 28 m less the leader's 5
-    assert ordered_margin_m(X, 5.0, Y, 9.0, 0.0, math.inf, RULES) == expected
-    assert ordered_margin_m(Y, 9.0, X, 5.0, 0.0, math.inf, RULES) == expected
+    assert _ordered(X, 5.0, Y, 9.0, 0.0, math.inf) == expected
+    assert _ordered(Y, 9.0, X, 5.0, 0.0, math.inf) == expected
 
 
 def test_ordered_margin_ends_where_the_leader_leaves_the_zone():
     leader, follower = pieces(0.0, 200.0, 10.0), pieces(0.0, 0.0, 15.0)
     # 20 s to the zone's end: 195 - 100 - 0.04 - 3e-9 * 25 - 18^2 / 129.54
     expected = close(92.4588419259009)
-    assert ordered_margin_m(leader, 5.0, follower, 5.0, 0.0, math.inf, RULES) == expected
-    assert ordered_margin_m(follower, 5.0, leader, 5.0, 0.0, math.inf, RULES) == expected
+    assert _ordered(leader, 5.0, follower, 5.0, 0.0, math.inf) == expected
+    assert _ordered(follower, 5.0, leader, 5.0, 0.0, math.inf) == expected
     # 4 s: 195 - 20 - ...
     expected = close(172.4588419259009)
-    assert ordered_margin_m(leader, 5.0, follower, 5.0, 0.0, 4.0, RULES) == expected
-    assert ordered_margin_m(follower, 5.0, leader, 5.0, 0.0, 4.0, RULES) == expected
+    assert _ordered(leader, 5.0, follower, 5.0, 0.0, 4.0) == expected
+    assert _ordered(follower, 5.0, leader, 5.0, 0.0, 4.0) == expected
 
 
 def test_merge_margin_is_over_eq_15_and_16():
-    assert merge_margin_m(A, 5.0, X, 7.0, 12.0, RULES) == close(8.0 - EQ_15_20)
-    assert merge_margin_m(A, 7.0, Y, 5.0, 12.0, RULES) == close(6.0 - EQ_15_20)
+    assert _at_merge(A, 5.0, X, 7.0, 12.0) == close(8.0 - EQ_15_20)
+    assert _at_merge(A, 7.0, Y, 5.0, 12.0) == close(6.0 - EQ_15_20)
 
 
 def test_merge_margin_takes_the_merging_vehicle_s_own_speed():
     # at 11 s it drives 18 m/s: 18 cos 30 - 20 is -4.4115.. m/s, 252.2243..  / 129.54 with 3.6^2
     needed_m = 0.04 + (3.6 * (20.0 - 9.0 * 3.0**0.5)) ** 2 / 129.54
-    assert merge_margin_m(A, 5.0, X, 5.0, 11.0, RULES) == close(31.0 - 5.0 - 17.0 - needed_m)
+    assert _at_merge(A, 5.0, X, 5.0, 11.0) == close(31.0 - 5.0 - 17.0 - needed_m)
 
 
 def test_pair_of_stream_and_merging_vehicle_counts_from_the_merge():

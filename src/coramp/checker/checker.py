@@ -158,7 +158,7 @@ def _examine_against_others(
 @kernel
 def _changed_way(record: Record, change: Change, k: int) -> Way:
     pieces = change.pieces[k, : change.piece_count[k]]
-    return way_with(pieces, change.merge_s[k], record.traits[change.rows[k]])
+    return way_with(pieces, change.merge_s[k], record.rows[change.rows[k]])
 
 
 @kernel
@@ -190,12 +190,12 @@ def _examine_command(
     if code == ACCEPTED:
         makes_gap = change.makes_gap[k] == 1
         gap_made_s = _last_merge_s(change)
-        traits = record.traits[change.rows[k]]
+        traits = record.rows[change.rows[k]]
         code = _examine_speeds(
             pieces, merge_s, traits, before.pieces, makes_gap, gap_made_s, bounds
         )
     if code == ACCEPTED:
-        code = _examine_accelerations(pieces, merge_s, record.traits[change.rows[k]], bounds)
+        code = _examine_accelerations(pieces, merge_s, record.rows[change.rows[k]], bounds)
     return code
 
 

@@ -16,8 +16,8 @@ from coramp.checker.pairs import Way
 
 FIRST, COUNT = range(2)
 """Columns of ``Record.places``."""
-MERGE, EXIT = range(2)
-"""Columns of ``Record.times_s``."""
+MERGE, EXIT = TRAITS, TRAITS + 1
+"""Columns of ``Record.rows`` behind those of what a vehicle can do."""
 ROWS, PIECES, LIVE, LONGEST = range(4)
 """Places in ``Record.used``; the last is the largest number of pieces that a row has had."""
 
@@ -26,16 +26,16 @@ class Record(NamedTuple):
     """All that was commanded, with room to spare; ``used`` tells how much of what is in use.
 
     Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. What it can
-    do is ``traits[i]`` (columns of ``distances``). It comes onto the mainline at ``times_s[i, 0]``
-    (minus infinity for a mainline vehicle, infinity while no merge is commanded) and leaves the
-    zone at ``times_s[i, 1]`` (infinity while it would stop before). ``live`` lists the rows on the
+    do is ``rows[i, :TRAITS]`` (columns of ``distances``). It comes onto the mainline at
+    ``rows[i, MERGE]`` (s; minus infinity for a mainline vehicle, infinity while no merge is
+    commanded) and leaves the zone at ``rows[i, EXIT]`` (s; infinity while it would stop before).
+    ``live`` lists the rows on the
     road, by entry.
     """
 
     pieces: FloatArray
     places: IntArray
-    traits: FloatArray
-    times_s: FloatArray
+    rows: FloatArray
     live: IntArray
     used: IntArray
 
@@ -45,8 +45,7 @@ def empty_record(rows: int, pieces: int) -> Record:
     return Record(
         np.empty((pieces, 4)),
         np.zeros((rows, 2), np.int64),
-        np.zeros((rows, TRAITS)),
-        np.full((rows, 2), math.inf),
+        np.full((rows, TRAITS + 2), math.inf),
         np.zeros(rows, np.int64),
         np.zeros(4, np.int64),
     )
@@ -84,8 +83,7 @@ def _pieces_on_road(record: Record) -> int:
 def _copy_live(record: Record, other: Record) -> None:
     """Copies everything but the pieces of those who are off the road into an empty record."""
     rows, live = record.used[ROWS], record.used[LIVE]
-    other.traits[:rows] = record.traits[:rows]
-    other.times_s[:rows] = record.times_s[:rows]
+    other.rows[:rows] = record.rows[:rows]
     other.live[:live] = record.live[:live]
     at = 0
     for row in record.live[:live]:
@@ -114,11 +112,11 @@ def way_of(record: Record, row: int) -> Way:
     pieces = record.pieces[first : first + record.places[row, COUNT]]
     return Way(
         pieces,
-        record.times_s[row, MERGE],
-        record.traits[row, LENGTH],
-        record.traits[row, POSITIONING],
-        record.traits[row, CLOCK],
-        record.traits[row, TIME_GAP],
+        record.rows[row, MERGE],
+        record.rows[row, LENGTH],
+        record.rows[row, POSITIONING],
+        record.rows[row, CLOCK],
+        record.rows[row, TIME_GAP],
     )
 
 
@@ -128,7 +126,7 @@ def note_entry(
 ) -> int:
     """Notes a vehicle that enters on ``pieces``; returns its row."""
     row = record.used[ROWS]
-    record.traits[row] = traits
+    record.rows[row, :TRAITS] = traits
     _write(record, row, record.used[PIECES], pieces, merge_s, zone_end_m)
     record.live[record.used[LIVE]] = row
     record.used[LIVE] += 1
@@ -165,8 +163,8 @@ def _write(
     start, end = record.used[PIECES], at + len(pieces)
     record.pieces[at:end] = pieces
     record.places[row, FIRST], record.places[row, COUNT] = start, end - start
-    record.times_s[row, MERGE] = merge_s
-    record.times_s[row, EXIT] = passes_s(record.pieces[start:end], zone_end_m)
+    record.rows[row, MERGE] = merge_s
+    record.rows[row, EXIT] = passes_s(record.pieces[start:end], zone_end_m)
     record.used[PIECES] = end
     record.used[LONGEST] = max(record.used[LONGEST], end - start)
 
@@ -176,7 +174,7 @@ def forget_exited(record: Record, time_s: float) -> None:
     """Takes rows off the live list that have left the zone by ``time_s``."""
     kept = 0
     for k in range(record.used[LIVE]):
-        if record.times_s[record.live[k], EXIT] > time_s:
+        if record.rows[record.live[k], EXIT] > time_s:
             record.live[kept] = record.live[k]
             kept += 1
     record.used[LIVE] = kept

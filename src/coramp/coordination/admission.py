@@ -180,7 +180,7 @@ def safe_to_enter(
     for row in fleet.live:
         if on_ramp and fleet.merge_time_s[row] <= time_s:
             continue
-        if fleet.lowest_m[row] - fleet.length_m[row] - highest_m > far_m:
+        if fleet.intercepts_m[row, 0] - fleet.length_m[row] - highest_m > far_m:
             continue
         margin_m = pair_margin_m(
             pieces,

@@ -42,8 +42,7 @@ class Book(NamedTuple):
     piece_count: IntArray
     length_m: FloatArray
     merge_time_s: FloatArray
-    lowest_m: FloatArray
-    highest_m: FloatArray
+    intercepts_m: FloatArray
     traits: FloatArray
     exit_s: FloatArray
     way_first: IntArray
@@ -63,8 +62,7 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.zeros(rows, np.int64),
         np.zeros(rows),
         np.full(rows, math.inf),
-        np.full(rows, -math.inf),
-        np.full(rows, math.inf),
+        np.tile(np.array([-math.inf, math.inf]), (rows, 1)),
         np.zeros((rows, len(Traits._fields))),
         np.full(rows, math.inf),
         np.zeros(rows, np.int64),
@@ -178,8 +176,7 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
         piece_count,
         book.length_m,
         book.merge_time_s,
-        book.lowest_m,
-        book.highest_m,
+        book.intercepts_m,
         book.traits,
         book.live[: book.used[LIVE]],
     )
@@ -226,7 +223,7 @@ def write_commitment(
     if merge_time_s < math.inf:
         from_s = max(now_s, merge_time_s)
         lowest_m, highest_m = intercept_range_m(way, from_s, cruise_speed_mps)
-        book.lowest_m[row], book.highest_m[row] = lowest_m, highest_m
+        book.intercepts_m[row, 0], book.intercepts_m[row, 1] = lowest_m, highest_m
     block = book.used[BLOCKS]
     book.block_row[block], book.block_first[block], book.block_count[block] = row, first, count
     book.used[BLOCKS] += 1

@@ -28,7 +28,7 @@ from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
-from coramp.vehicles.traits import traits_or_usual
+from coramp.vehicles.traits import LENGTH, traits_or_usual
 
 NEVER = 1 << 60
 WAITS = -1
@@ -43,7 +43,7 @@ ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
 class Gate(NamedTuple):
     """Requests to enter, who is next on each stream (0 mainline, 1 ramp), and who entered when.
 
-    The first five fields are those of the world's feed. A request is read, and counted in
+    The first four fields are those of the world's feed. A request is read, and counted in
     ``feed[HEARD]``, only when its step has come.
 
     - ``of_stream[s]``: the ``vehicles[s]`` requests of stream s that have been heard.
@@ -61,7 +61,6 @@ class Gate(NamedTuple):
     step: IntArray
     on_ramp: BoolArray
     speed_mps: FloatArray
-    length_m: FloatArray
     traits: FloatArray
     of_stream: IntArray
     vehicles: IntArray
@@ -158,7 +157,7 @@ def _waiting_at(
         ]
     since_s = np.empty(len(numbers))
     since_s[:] = gate.step[numbers] * step_s
-    return numbers, gate.on_ramp[numbers], since_s, gate.length_m[numbers]
+    return numbers, gate.on_ramp[numbers], since_s, gate.traits[numbers, LENGTH]
 
 
 @kernel
@@ -284,8 +283,7 @@ def enter(
     Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, or the checker's reason.
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
-    length_m, speed_mps = gate.length_m[arrival], gate.speed_mps[arrival]
-    traits = traits_or_usual(gate.traits[arrival], length_m, rules)
+    traits, speed_mps = traits_or_usual(gate.traits[arrival], rules), gate.speed_mps[arrival]
     pieces = plan_entry(
         ways_of(book),
         traits,

@@ -44,7 +44,7 @@ class Ledger:
     def fleet(self) -> Fleet:
         """All commitments as planners read them."""
         book = self.book
-        return Fleet(*book[:8], book.live[: book.used[LIVE]])
+        return Fleet(*book[:7], book.live[: book.used[LIVE]])
 
     @property
     def history(self) -> Iterator[Commitment]:

@@ -3,6 +3,7 @@
 import math
 import zlib
 from itertools import count
+from operator import itemgetter
 
 import numpy as np
 
@@ -90,27 +91,21 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
             *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
     numbers = (count(1), count(1))
-    given.sort(key=_in_order)
+    given.sort(key=IN_ORDER)
     return [
-        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, *rest)
-        for _, on_ramp, rest in given
+        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, mps, length_m, kind, traits)
+        for step, on_ramp, mps, length_m, kind, traits in given
     ]
-
-
-def _in_order(arrival: "Unnamed") -> tuple[int, bool, float, float]:
-    """By time, the mainline first; then by speed and length, where a stream has two at once."""
-    step, on_ramp, rest = arrival
-    return step, on_ramp, rest[1], rest[2]
 
 
 def _name(on_ramp: bool, number: int) -> str:
     return f"{'r' if on_ramp else 'm'}{number:05d}"
 
 
-Rest = tuple[int, float, float, str, Traits | None]
-"""Of an arrival: step, speed (m/s), length (m), type, traits."""
-Unnamed = tuple[int, bool, Rest]
-"""An arrival without its name: step, by the ramp or not, and the rest."""
+Unnamed = tuple[int, bool, float, float, str, Traits | None]
+"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m), type, traits."""
+IN_ORDER = itemgetter(0, 1, 2, 3)
+"""By time, the mainline first; then by speed and length, where a stream has two at once."""
 
 
 def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
@@ -119,26 +114,25 @@ def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
         kind = scenario.type_named(arrival.type or "")
         top_mps = arrival.top_speed_mps or 0.5 * sum(kind.top_speeds_mps)
         step = round(arrival.time_s / scenario.control.step_s)
-        rest = _rest(scenario, kind, step, arrival.speed_mps, top_mps, arrival.length_m)
-        found.append((step, arrival.stream == "ramp", rest))
+        rest = _rest(scenario, kind, arrival.speed_mps, top_mps, arrival.length_m)
+        found.append((step, arrival.stream == "ramp", *rest))
     return found
 
 
 def _rest(
     scenario: Scenario,
     kind: VehicleType,
-    step: int,
     speed_mps: float,
     top_mps: float,
     length_m: float | None = None,
-) -> Rest:
+) -> tuple[float, float, str, Traits | None]:
     """Returns an arrival of a type; nobody enters faster than it can drive."""
     length_m = kind.length_m if length_m is None else length_m
     traits = None
     if not isinstance(scenario.vehicle, Vehicle) or not math.isinf(top_mps):
         own = kind.traits(scenario.usual_traits(length_m), top_mps)
         traits = own._replace(length_m=length_m)
-    return step, min(speed_mps, top_mps), length_m, kind.name, traits
+    return min(speed_mps, top_mps), length_m, kind.name, traits
 
 
 def _stream_arrivals(
@@ -158,12 +152,12 @@ def _stream_arrivals(
     if isinstance(scenario.vehicle, Vehicle):
         length_m = scenario.vehicle.length_m
         return [
-            (step, on_ramp, (step, speed_mps, length_m, CAR, None))
+            (step, on_ramp, speed_mps, length_m, CAR, None)
             for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
         ]
     kinds = kinds_of(scenario, on_ramp, len(times_s), seed)
     return [
-        (step, on_ramp, _rest(scenario, kind, step, speed_mps, top_mps))
+        (step, on_ramp, *_rest(scenario, kind, speed_mps, top_mps))
         for step, speed_mps, (kind, top_mps) in zip(
             steps.tolist(), speeds_mps.tolist(), kinds, strict=True
         )

@@ -8,21 +8,18 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.events import RequestToEnter
-from coramp.vehicles.traits import Traits
-
-UNBOUND = (math.nan,) * len(Traits._fields)
+from coramp.vehicles.traits import LENGTH, Traits
 
 
 class Requests(NamedTuple):
     """Requests as kernels read them; there may be more entries than the feed has requests.
 
-    Rows of ``traits`` are nan for vehicles that only the common limits bind.
+    Of a vehicle that only the common limits bind, ``traits`` has the length, and nan for the rest.
     """
 
     step: IntArray
     on_ramp: BoolArray
     speed_mps: FloatArray
-    length_m: FloatArray
     traits: FloatArray
 
 
@@ -40,7 +37,6 @@ class RequestFeed:
             np.array([request.step for request in listed], np.int64),
             np.array([request.on_ramp for request in listed], np.bool_),
             np.array([request.speed_mps for request in listed], np.float64),
-            np.array([request.length_m for request in listed], np.float64),
             _traits_rows(listed),
         )
         if (np.diff(self.arrays.step) < 0).any():
@@ -64,21 +60,18 @@ class RequestFeed:
             self.arrays = Requests(*(_longer(column) for column in self.arrays))
         arrays = self.arrays
         arrays.step[place], arrays.on_ramp[place] = request.step, request.on_ramp
-        arrays.speed_mps[place], arrays.length_m[place] = numbers
-        arrays.traits[place] = _traits_row(request)
+        arrays.speed_mps[place] = request.speed_mps
+        arrays.traits[place] = _traits_rows([request])[0]
         self._list.append(request)
 
 
 def _traits_rows(requests: Sequence[RequestToEnter]) -> FloatArray:
-    rows = np.full((len(requests), len(UNBOUND)), math.nan)
+    rows = np.full((len(requests), len(Traits._fields)), math.nan)
+    rows[:, LENGTH] = [request.length_m for request in requests]
     for place, request in enumerate(requests):
         if request.traits is not None:
             rows[place] = request.traits
     return rows
-
-
-def _traits_row(request: RequestToEnter) -> tuple[float, ...]:
-    return UNBOUND if request.traits is None else request.traits
 
 
 def _longer(column: Any) -> Any:

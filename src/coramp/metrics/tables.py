@@ -39,6 +39,7 @@ from coramp.metrics.separations import VIOLATIONS as COUNT
 from coramp.metrics.types import (
     free_flow_of_each_s,
     fuel_models_of,
+    trait_columns,
     traits_of,
     type_figures,
 )
@@ -55,7 +56,7 @@ from coramp.records.schemas import (
 )
 from coramp.scenarios.model import Scenario
 from coramp.strategies.situation import RUNGS
-from coramp.vehicles.traits import MASS, Traits
+from coramp.vehicles.traits import MASS
 
 Columns = Mapping[str, Any]
 """Columns of a table by name: arrays, nan for what is not there."""
@@ -94,7 +95,8 @@ class RunTables:
         """One row a vehicle."""
         columns = dict(self.vehicle_columns)
         columns["stream"] = _stream_names(columns["stream"])
-        return _frame(VEHICLES, **columns)
+        traits = trait_columns(traits_of(self.outcome.passages, self.scenario))
+        return _frame(VEHICLES, **columns, **traits)
 
     @cached_property
     def speeds(self) -> pl.DataFrame:
@@ -129,8 +131,10 @@ class RunTables:
         return None if told is None else as_frame(told, self.scenario.control.step_s)
 
     @cached_property
-    def types(self) -> pl.DataFrame:
-        """One row per type of vehicle and stream."""
+    def types(self) -> pl.DataFrame | None:
+        """One row per type of vehicle and stream, where there is more than one type."""
+        if len(self.scenario.vehicle_types) == 1:
+            return None
         columns = self.vehicle_columns
         rows = type_figures(
             self.outcome.passages, columns["delay_s"], columns["fuel_l"], columns["finished"]
@@ -204,13 +208,7 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
         "finished": finished,
         "plan_error_m": passages.plan_error_m,
         "vehicle_type": passages.vehicle_type or ("car",) * len(passages),
-        **{name: _finite_column(traits[:, k]) for k, name in enumerate(Traits._fields)},
     }
-
-
-def _finite_column(values: FloatArray) -> FloatArray:
-    """Returns a column with nan, which tables show as null, where nothing binds the vehicle."""
-    return np.where(np.isinf(values), np.nan, values)
 
 
 def _stream_names(streams: IntArray) -> list[str]:

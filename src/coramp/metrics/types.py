@@ -10,7 +10,7 @@ from coramp.records.outcome import Passages
 from coramp.records.schemas import Row
 from coramp.road.rules import packed, unpacked
 from coramp.scenarios.model import Scenario
-from coramp.vehicles.traits import TOP_SPEED, cruise_mps
+from coramp.vehicles.traits import TOP_SPEED, Traits, cruise_mps
 
 
 def traits_of(passages: Passages, scenario: Scenario) -> FloatArray:
@@ -24,8 +24,17 @@ def traits_of(passages: Passages, scenario: Scenario) -> FloatArray:
     return rows
 
 
+def trait_columns(traits: FloatArray) -> dict[str, FloatArray]:
+    """Returns the columns of a table: nan, there null, where nothing binds a vehicle."""
+    known = np.where(np.isinf(traits), np.nan, traits)
+    return {name: known[:, k] for k, name in enumerate(Traits._fields)}
+
+
 def fuel_models_of(passages: Passages, scenario: Scenario) -> IntArray:
     """Returns the place of each vehicle's model of fuel in ``FUEL_MODELS``."""
+    if len(scenario.vehicle_types) == 1:
+        only = FUEL_MODELS.index(scenario.vehicle_types[0].fuel)
+        return np.full(len(passages), only, np.int64)
     names = passages.vehicle_type or ("",) * len(passages)
     of_type = {kind.name: FUEL_MODELS.index(kind.fuel) for kind in scenario.vehicle_types}
     first = next(iter(of_type.values()))

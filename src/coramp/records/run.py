@@ -21,8 +21,8 @@ class RunRecords:
 
     ``content`` is what ``run.json`` holds, ``summary`` the row of ``runs.parquet``. There are
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
-    positions and figures by type are None where a coramp that kept none wrote the run, messages
-    where they were not to be kept, and in a run that was read.
+    positions and figures by type (of runs with several types) are None where a coramp that kept
+    none wrote the run, messages where they were not to be kept, and in a run that was read.
     """
 
     content: Row

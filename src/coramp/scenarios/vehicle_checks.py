@@ -19,8 +19,8 @@ def vehicle_problems(scenario: "Scenario") -> list[str]:
     types, problems = scenario.vehicle_types, []
     if isinstance(scenario.vehicle, tuple):
         problems = share_problems(types)
-    for k, kind in enumerate(types):
-        problems += [f"vehicle.{k}.{line}" for line in _type_problems(scenario, kind)]
+        for k, kind in enumerate(types):
+            problems += [f"vehicle.{k}.{line}" for line in _type_problems(scenario, kind)]
     names = [kind.name for kind in types]
     problems += [
         f"arrivals.{k}.type: there is no type {arrival.type!r}; allowed are {', '.join(names)}"

@@ -221,8 +221,8 @@ def find_unsafe_pair(
             if other_entry >= 0:
                 other_merge_s = proposal.merge_time_s[other_entry]
             if other_entry < 0 and min(one_merge_s, other_merge_s) <= from_s:
-                ahead_m = fleet.lowest_m[other_row] - fleet.length_m[other_row] - high_m
-                behind_m = low_m - fleet.length_m[row] - fleet.highest_m[other_row]
+                ahead_m = fleet.intercepts_m[other_row, 0] - fleet.length_m[other_row] - high_m
+                behind_m = low_m - fleet.length_m[row] - fleet.intercepts_m[other_row, 1]
                 if max(ahead_m, behind_m) > far_m:
                     continue
             margin_m = pair_margin_m(

@@ -19,7 +19,7 @@ class Fleet(NamedTuple):
     Row i's trajectory is ``pieces[first_piece[i] : first_piece[i] + piece_count[i]]``.
     ``merge_time_s`` is minus infinity for mainline vehicles, infinity for a ramp vehicle whose
     merge is not committed. ``traits`` are rows of
-    ``vehicles.traits``. ``lowest_m`` and ``highest_m`` bound ``station - v0 t`` over the
+    ``vehicles.traits``. ``intercepts_m[i]`` bound ``station - v0 t``, below and above, over the
     trajectory.
     """
 
@@ -28,8 +28,7 @@ class Fleet(NamedTuple):
     piece_count: IntArray
     length_m: FloatArray
     merge_time_s: FloatArray
-    lowest_m: FloatArray
-    highest_m: FloatArray
+    intercepts_m: FloatArray
     traits: FloatArray
     live: IntArray
 

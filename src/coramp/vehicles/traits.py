@@ -47,12 +47,12 @@ class Traits(NamedTuple):
 
 
 @kernel
-def traits_or_usual(traits: FloatArray, length_m: float, rules: Rules) -> FloatArray:
+def traits_or_usual(traits: FloatArray, rules: Rules) -> FloatArray:
     """Returns a row of traits, filled in for a vehicle that only the common limits bind (nan)."""
-    if not math.isnan(traits[LENGTH]):
+    if not math.isnan(traits[MASS]):
         return traits
     usual = np.full(len(traits), math.inf)
-    usual[LENGTH], usual[MASS] = length_m, CAR_MASS_KG
+    usual[LENGTH], usual[MASS] = traits[LENGTH], CAR_MASS_KG
     usual[POSITIONING] = rules.safety.positioning_error_m
     usual[CLOCK] = rules.safety.clock_error_s
     usual[TIME_GAP] = rules.safety.time_gap_s
