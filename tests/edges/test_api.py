@@ -31,7 +31,6 @@ SCHEMAS = {
     "attempts": ATTEMPTS,
     "positions": TRAJECTORIES,
     "violations": VIOLATIONS,
-    "attempts": ATTEMPTS,
 }
 
 

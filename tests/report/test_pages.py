@@ -51,22 +51,103 @@ def test_scrubbing_puts_vehicles_where_the_records_say(browser, folders):
     records = coramp.run("paper", engine="exact", **TRAFFIC)
     pieces = {name: rows for name, rows, _ in pieces_of_each(records.trajectories)}
     with opened(browser, path.as_uri()) as page:
+        page.get_by_label("view").select_option("whole")
         for time_s in (31.0, 55.5, 90.2):
             page.locator("input[type=range]").fill(str(time_s))
             seen = page.evaluate("coramp.shown.replay.positions(0)")
             there = records.vehicles.filter(
                 (records.vehicles["entry_s"] <= time_s) & (records.vehicles["exit_s"] >= time_s)
             )["vehicle_id"]
-            assert sorted(vehicle["id"] for vehicle in seen) == sorted(there)
-            left_m, scale = page.evaluate(
-                "(() => { const road = coramp.shown.replay.panels[0].road;"
-                " return [road.left, road.scale / road.ratio]; })()"
+            assert sorted({vehicle["id"] for vehicle in seen}) == sorted(there)
+            rows, scale = page.evaluate(
+                "(({rows, scale}) => [rows, scale])(coramp.shown.replay.panels[0].road)"
             )
             for vehicle in seen:
                 station_m = station_and_speed(pieces[vehicle["id"]], time_s)[0]
                 assert vehicle["station"] == pytest.approx(station_m, abs=2e-3)
-                if station_m > 0.0:
-                    assert vehicle["px"] == pytest.approx((station_m - left_m) * scale, abs=1.0)
+                left_m = rows[vehicle["row"]]["from"]
+                assert vehicle["px"] == pytest.approx((station_m - left_m) * scale, abs=1.0)
+
+
+@in_browser
+def test_the_delay_so_far_ends_at_the_runs_delay(browser, folders):
+    path = replay(folders / "mainline-priority", folders / "uncontrolled")
+    with opened(browser, path.as_uri()) as page:
+        for place, name in enumerate(("mainline-priority", "uncontrolled")):
+            summary = read_run(folders / name).content["summary"]
+            lost_s = page.evaluate(f"coramp.delaySoFar(coramp.shown.runs[{place}], 1e4)")
+            assert lost_s == pytest.approx(summary["delay_s"], abs=2e-3)
+        page.locator(".replay").focus()
+        page.keyboard.press("End")
+        shown = page.locator(".delay strong").all_inner_texts()
+        assert shown[1] == f"{summary['delay_s']:.1f} s"
+        assert page.evaluate("coramp.delaySoFar(coramp.shown.runs[0], -1)") is None
+
+
+@in_browser
+def test_a_vehicle_alone_has_no_delay_on_its_way(browser, folders, tmp_path):
+    alone = {"mainline_veh_h": 0.0, "ramp_veh_h": 200.0, "seed": 3, "horizon_s": 60.0}
+    coramp.run("paper", engine="exact", out=tmp_path, **alone)
+    with opened(browser, replay(tmp_path).as_uri()) as page:
+        lost_s = page.evaluate(
+            "(() => { const run = coramp.shown.runs[0], i = run.everyone[0], all = [];"
+            " for (let t = run.scheduled[i]; t < run.exit[i] + 2; t += 1)"
+            " all.push(coramp.delayOf(run, i, t)); return all; })()"
+        )
+        assert len(lost_s) > 20
+        assert lost_s == pytest.approx([0.0] * len(lost_s), abs=0.2)
+
+
+@in_browser
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (375, 812)])
+def test_the_play_bar_is_in_sight_and_vehicles_are_big(browser, folders, width, height):
+    path = replay(folders / "mainline-priority", folders / "uncontrolled")
+    with opened(browser, path.as_uri(), width) as page:
+        page.set_viewport_size({"width": width, "height": height})
+        for scrolled in (0, 400):
+            page.evaluate(f"scrollTo(0, {scrolled})")
+            box = page.get_by_role("button", name="play").bounding_box()
+            assert 0 <= box["y"] <= height - box["height"]
+        assert page.evaluate("5 * coramp.shown.replay.panels[0].road.scale") >= 14.0
+        canvas = page.locator("canvas[role=img]").first.bounding_box()
+        assert canvas["width"] > 0.92 * width
+        first_ms = page.evaluate(
+            "performance.getEntriesByName('first-contentful-paint')[0].startTime"
+        )
+        assert first_ms < 1000.0
+
+
+@in_browser
+def test_keys_hold_without_focus_and_a_vehicle_is_named(browser, folders):
+    path = replay(folders / "mainline-priority", folders / "uncontrolled")
+    with opened(browser, path.as_uri()) as page:
+        before = page.evaluate("coramp.shown.replay.time")
+        page.keyboard.press(".")
+        assert page.evaluate("coramp.shown.replay.time") == pytest.approx(before + 0.1)
+        page.keyboard.press(" ")
+        page.get_by_role("button", name="pause").wait_for()
+        page.keyboard.press(" ")
+        page.get_by_role("button", name="play").wait_for()
+        page.keyboard.press("n")
+        chosen = page.evaluate("coramp.shown.replay.selected")
+        assert chosen.startswith("r")
+        for state in page.locator(".state").all_inner_texts():
+            assert "smallest gap now" in state
+        assert f"{chosen}: " in page.locator(".state").first.inner_text()
+        seen = page.evaluate("coramp.shown.replay.positions(0)[0]")
+        canvas = page.locator("canvas[role=img]").first.bounding_box()
+        page.mouse.move(canvas["x"] + seen["px"] - 4, canvas["y"] + seen["py"])
+        assert page.evaluate("coramp.shown.replay.hovered") == seen["id"]
+
+
+@in_browser
+def test_long_vehicles_are_drawn_as_tractor_and_trailer(browser, folders):
+    cases = [(None, 4.0, False), (None, 16.5, True), ("truck", 9.0, True), ("bus", 12.0, False)]
+    with opened(browser, replay(folders / "mainline-priority").as_uri()) as page:
+        for kind, length_m, articulated in cases:
+            run = json.dumps({"type": [kind], "length": [length_m]})
+            assert page.evaluate(f"coramp.isArticulated({run}, 0)") is articulated
+        assert page.evaluate("coramp.isArticulated({length: [16.5]}, 0)") is True
 
 
 @in_browser

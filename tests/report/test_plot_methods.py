@@ -148,8 +148,11 @@ def test_the_decision_of_a_run_at_hand_is_drawn(run):
 
 
 def test_a_plan_is_drawn_before_and_after():
-    before, after = coramp.plan("example").plot_time_space().axes
-    assert (before.get_title(), after.get_title()) == ("before", "after: mainline-priority")
+    before, after = coramp.plan("example").plot_time_space().axes[:2]
+    assert (before.get_title(), after.get_title()) == (
+        "before the decision",
+        "after the decision: mainline priority",
+    )
     assert {"m4", "m5", "r1"} <= set(lines_of(after))
 
 

@@ -78,6 +78,7 @@ def test_the_margin_figure_draws_shares_and_what_the_checker_asks():
         drawn("uncontrolled", "paper"),
     ]
     (axes,) = margin_figure(runs, 0.15).axes
+    assert "0.15 m, the least that" in axes.texts[0].get_text()
     mainline, ramp, asked = axes.get_lines()
     assert mainline.get_xdata().tolist() == [0.2, 3.0]
     assert mainline.get_ydata().tolist() == [50.0, 100.0]
@@ -85,6 +86,16 @@ def test_the_margin_figure_draws_shares_and_what_the_checker_asks():
     assert asked.get_xdata() == [0.15, 0.15]
     assert axes.get_xlabel() == "margin over the safe distance (m)"
     assert axes.get_ylabel() == "decisions with at most this margin (%)"
+
+
+def test_strategies_whose_margins_coincide_are_one_line_that_says_so():
+    same = [drawn(margins=(0.1, 3.0)), drawn("ramp-priority", margins=(0.10002, 3.0))]
+    (axes,) = margin_figure([*same, drawn("slots", margins=(9.0,))], 0.1).axes
+    _, labels = axes.get_legend_handles_labels()
+    assert labels == [
+        "1800 + 200 veh/h: mainline priority and ramp priority coincide",
+        "1800 + 200 veh/h: slots",
+    ]
 
 
 def test_the_road_is_drawn_as_long_as_the_scenario_says():

@@ -1,12 +1,14 @@
 """Figures of studies, from rows made by hand."""
 
+import math
+
 import polars as pl
 import pytest
 
 from coramp.report.capacity_figure import capacity_figure
 from coramp.report.flow_figures import delay_figure, flows_of, gain_figure, rung_figure
 from coramp.report.sensitivity_figure import sensitivity_figure, settings_of
-from coramp.report.style import look_of
+from coramp.report.style import COOPERATIVE, FREE_MARKERS, METERED, UNCONTROLLED, look_of
 from tests.study import overridden, run_row, runs_of
 
 FLOWS = [(800.0, 200.0), (1800.0, 500.0)]
@@ -88,7 +90,15 @@ def test_strategies_differ_by_more_than_colour():
     for part in ("colour", "marker", "line", "label"):
         assert len({getattr(look, part) for look in looks}) == 4
     assert look_of("mine").label == "mine"
+    assert look_of("mine") == look_of("mine")
     assert look_of("uncontrolled", "sleepy").label == "uncontrolled (sleepy)"
+
+
+def test_no_two_known_strategies_share_colour_and_marker():
+    looks = [*COOPERATIVE.values(), *METERED.values(), *UNCONTROLLED.values()]
+    drawn = [(look.colour, look.marker) for look in looks]
+    assert len(set(drawn)) == len(drawn)
+    assert {marker for _, marker in drawn}.isdisjoint(FREE_MARKERS)
 
 
 def test_gains_stand_beside_each_other_and_beside_the_papers(runs):
@@ -118,15 +128,20 @@ def test_there_is_no_gain_over_a_baseline_that_loses_nothing(runs):
 
 def test_rungs_are_shares_of_all_merges_on_top_of_each_other(runs):
     mainline, ramp = rung_figure(runs).axes
-    bars = {c.get_label(): [(b.get_y(), b.get_height()) for b in c] for c in mainline.containers}
-    assert bars["free"][0] == pytest.approx((0.0, 60.0))
+    bars = {
+        c.get_label()[:5]: [(b.get_y(), b.get_height()) for b in c] for c in mainline.containers
+    }
+    assert bars["free:"][0] == pytest.approx((0.0, 60.0))
     assert bars["reach"][0] == pytest.approx((60.0, 30.0))
-    assert bars["create"][0] == pytest.approx((90.0, 0.0))
     assert bars["delay"][0] == pytest.approx((90.0, 10.0))
+    assert "creat" not in bars  # a rung that gave no merge is neither drawn nor in the legend
+    assert [t.get_text() for t in mainline.texts] == ["60 %"] * 2 + ["30 %"] * 2 + ["10 %"] * 2
     (held,) = mainline.get_lines()
     assert held.get_ydata() == pytest.approx([20.0, 20.0])
-    heights = {c.get_label(): c[1].get_height() for c in ramp.containers}
-    assert heights == pytest.approx({"free": 50.0, "reach": 0.0, "create": 50.0, "delay": 0.0})
+    heights = {c.get_label()[:5]: c[1].get_height() for c in ramp.containers}
+    assert heights == pytest.approx({"free:": 50.0, "creat": 50.0})
+    assert ramp.get_lines()[:] == []
+    assert ramp.get_title() == "ramp priority: nobody had to wait (hold)"
     assert mainline.get_ylabel() == "share of ramp vehicles (%)"
 
 
@@ -168,6 +183,26 @@ def test_sensitivity_has_a_column_a_setting_and_shows_everything(settings):
     assert high > 40.0
     limits = [line.get_ydata()[0] for line in axes[1].get_lines() if len(line.get_xdata()) == 2]
     assert 5.0 in limits
+    for diagram in axes:
+        assert "5 s: broken down above" in [text.get_text() for text in diagram.texts]
+
+
+def test_settings_that_change_nothing_share_a_diagram():
+    runs = runs_of(
+        setting(None, 0.1),
+        setting("safety.time_gap_s=1.0", 40.0),
+        setting("safety.positioning_error_m=0.5", 0.2),
+        setting("safety.clock_error_s=0.01", 0.1),
+    )
+    axes = sensitivity_figure(runs).axes
+    assert len(axes) == 4
+    heights, ends = errorbars(axes[0])["1800 + 500 veh/h"]
+    assert heights == pytest.approx([0.15, 0.1])  # the middle of each setting's delays
+    assert ends[0] == pytest.approx((0.1, 0.2))
+    words = [label.get_text() for label in axes[2].get_xticklabels()]
+    assert words[0] == "positioning error L₁,\n0.02 to 0.5 m"
+    assert axes[0].get_title() == "mainline: no delay changes by more than 0.5 s"
+    assert axes[3].get_xlabel() == "time gap (s)"
 
 
 def test_capacity_has_a_line_a_combination_in_the_strategys_colour():
@@ -194,6 +229,41 @@ def test_capacity_has_a_line_a_combination_in_the_strategys_colour():
     assert lines[0] != lines[1]
     assert axes.get_xlabel() == "ramp flow (veh/h)"
     assert axes.get_ylabel() == "mainline flow at breakdown (veh/h)"
+
+
+def test_limits_of_the_search_are_no_results():
+    rows = [
+        delays(
+            "mainline-priority", (flow, ramp), 9.0 if (flow, ramp) == (1600.0, 500.0) else 0.1, 0.1
+        )
+        for ramp in (200.0, 500.0)
+        for flow in (1200.0, 1600.0)
+    ]
+    rows += [delays("slots", (flow, 200.0), 0.1, 0.1) for flow in (1200.0, 1600.0)]
+    figure = capacity_figure(runs_of(*rows))
+    (axes,) = figure.axes
+    (container,) = axes.containers
+    heights = container.lines[0].get_ydata().tolist()
+    assert heights == pytest.approx([math.nan, 1600.0], nan_ok=True)
+    (limit,) = [line for line in axes.get_lines() if line.get_gid() == "search limit above"]
+    assert limit.get_xydata().tolist() == [[200.0, 1600.0]]
+    assert limit.get_markerfacecolor() == "none"
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "search ended here without breakdown: the flow is higher" in words
+    assert figure.get_suptitle().endswith("not drawn: slots, Eq. 1")
+
+
+def test_many_combinations_have_a_diagram_per_following_distance():
+    rows = []
+    for gap in ("0.6", "1.0", "1.4"):
+        for strategy in ("mainline-priority", "slots", "game"):
+            for flow, delay in ((1200.0, 0.1), (1600.0, 9.0)):
+                row = delays(strategy, (flow, 500.0), delay, 0.1)
+                rows.append(overridden(row, f"safety.time_gap_s={gap}"))
+    drawn = [axes for axes in capacity_figure(runs_of(*rows)).axes if axes.axison]
+    assert [axes.get_title() for axes in drawn] == ["at 0.6 s", "at 1.0 s", "at 1.4 s"]
+    for axes in drawn:
+        assert set(errorbars(axes)) == {"mainline priority", "slots", "game"}
 
 
 def test_capacity_shows_what_the_lane_carries_where_it_lies_within_the_range():

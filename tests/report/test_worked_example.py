@@ -1,5 +1,6 @@
 """The worked example: 100 and 60 km/h, the ramp vehicle 100 m before the nose (Fig. 6 to 11)."""
 
+import matplotlib.colors
 import pytest
 
 from coramp.report.plan_figure import plan_figure
@@ -93,11 +94,11 @@ def test_positions_are_those_of_the_snapshot_and_of_the_merges(mainline, ramp):
 
 
 def test_the_plan_figure_stops_the_ramp_vehicle_before_the_nose_and_merges_it_after(mainline):
-    before, after = plan_figure(mainline).axes
+    before, after = plan_figure(mainline).axes[:2]
     stopped_m, merged_m = lines_of(before)["r1"][1], lines_of(after)["r1"][1]
     assert stopped_m[-1] == pytest.approx(-1.0)
     assert merged_m[-1] > 200.0
-    (merge,) = after.collections
+    (merge,) = [c for c in after.collections if c.get_gid() != "merged"]
     assert merge.get_offsets().tolist()[0] == pytest.approx(
         [
             mainline.decisions["merge_time_s"].item(),
@@ -105,3 +106,19 @@ def test_the_plan_figure_stops_the_ramp_vehicle_before_the_nose_and_merges_it_af
         ]
     )
     assert {text.get_text() for text in after.texts} == {*(f"m{k}" for k in range(1, 8)), "r1"}
+
+
+def test_the_plan_figure_tells_lanes_apart(mainline):
+    before, after, road_before, road_after = plan_figure(mainline).axes
+    assert not [c for c in before.collections if c.get_gid() == "merged"]
+    (merged,) = [c for c in after.collections if c.get_gid() == "merged"]
+    (points,) = merged.get_segments()
+    merge_s = mainline.decisions["merge_time_s"].item()
+    assert points[0, 0] == pytest.approx(merge_s, abs=0.1)
+    grey = next(line for line in after.get_lines() if line.get_gid() == "m4").get_color()
+    assert matplotlib.colors.to_hex(merged.get_colors()[0]) == grey
+    for road in (road_before, road_after):
+        boxes = boxes_of(road)
+        assert boxes["r1-from-above"].get_y() < -1.0 < boxes["m4-from-above"].get_y()
+    # while the lines of r1 and m4 cross, r1 is beside it on the acceleration lane
+    assert 0.0 < boxes["r1-from-above"].get_x() < 200.0

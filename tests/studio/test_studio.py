@@ -84,9 +84,9 @@ def test_two_strategies_meet_the_same_arrivals(answers):
         ({"error": "nan"}, "positioning error: nan is out of range"),
         ({"ramp": "inf"}, "ramp flow: inf is out of range"),
         ({"seed": "1.5"}, "seed: 1.5 is not whole"),
-        ({"colour": "red"}, "colour: cannot be set here; allowed are mainline, ramp"),
+        ({"colour": "red"}, "colour: cannot be set here; allowed are gap, mainline, ramp"),
         ({"strategy": "luck"}, "there is no 'luck'; allowed are mainline-priority"),
-        ({"strategy": "nothing"}, "nothing is chosen"),
+        ({"strategy": "nothing", "second": "nothing"}, "nothing is chosen"),
         ({"ramp_speed": "30"}, "ramp.speed_mps: 30 is not below mainline.speed_mps"),
     ],
 )
@@ -220,7 +220,9 @@ def test_a_run_that_is_under_way_is_run_once(monkeypatch):
     runs, studio, found = [], Answers(studio_of("paper")), []
     monkeypatch.setattr(module, "recorded", lambda spec: runs.append(spec) or recorded(spec))
     threads = [
-        threading.Thread(target=lambda: found.append(told(studio, horizon=60, seed=9)))
+        threading.Thread(
+            target=lambda: found.append(told(studio, horizon=60, seed=9, second="nothing"))
+        )
         for _ in range(4)
     ]
     for thread in threads:
@@ -256,10 +258,46 @@ def test_a_slider_changes_figures_picture_and_address(browser, server):
         assert after[1] < before[1]
         assert page.locator("[data-number=mainline]").input_value() == "1000"
         assert page.url.endswith("?mainline=1000")
-        assert page.evaluate("coramp.shown.diagrams.length") == 1
-        page.locator("[data-choice=second]").select_option("ramp-priority")
+        assert page.evaluate("coramp.shown.diagrams.length") == 2
+        page.locator("[data-choice=second]").select_option("nothing")
         page.evaluate("coramp.ready")
-        assert page.locator("#show canvas[role=img]").count() == 2
+        assert page.locator("#show canvas[role=img]").count() == 1
+
+
+@in_browser
+def test_what_decides_is_at_hand_and_the_rest_folds(browser, server):
+    with opened(browser, server.address) as page:
+        for name in ("gap", "mainline", "ramp", "lane"):
+            assert page.locator(f"[data-slider={name}]").is_visible()
+        assert page.locator("[data-choice=second]").input_value() == "uncontrolled:fair"
+        assert page.locator("[data-slider=error]").is_hidden()
+        titles = page.evaluate("coramp.shown.runs.map((run) => run.title)")
+        assert titles == ["mainline priority", "no control, fair drivers"]
+        page.get_by_text("More settings").click()
+        assert page.locator("[data-slider=error]").is_visible()
+        page.locator("[data-slider=gap]").fill("1")
+        page.evaluate("coramp.ready")
+        assert page.get_by_role("button", name="Reset").is_visible()
+        page.get_by_role("button", name="Reset").click()
+        page.evaluate("coramp.ready")
+        assert page.locator("[data-number=gap]").input_value() == "0"
+    with opened(browser, f"{server.address}?error=0.5&second=nothing") as page:
+        assert page.locator("[data-slider=error]").is_visible()
+
+
+@in_browser
+def test_no_figure_stands_beside_what_was_not_computed(browser, server):
+    with opened(browser, f"{server.address}?second=nothing&horizon=60") as page:
+        assert page.locator("#figures table").is_visible()
+        assert "difference between plan and SUMO" not in page.locator("#figures").inner_text()
+        page.locator("[data-number=mainline]").fill("9999")
+        page.evaluate("coramp.ready")
+        assert page.get_by_role("alert").is_visible()
+        for place in ("#figures", "#answer", "#show"):
+            assert page.locator(place).is_hidden()
+        page.locator("[data-number=mainline]").fill("900")
+        page.evaluate("coramp.ready")
+        assert page.locator("#figures table").is_visible()
 
 
 @in_browser
@@ -280,6 +318,7 @@ def test_the_address_brings_a_setting_back(browser, server):
 @in_browser
 def test_what_is_out_of_range_is_told_in_the_page(browser, server):
     with opened(browser, server.address) as page:
+        page.get_by_text("More settings").click()
         page.locator("[data-number=error]").fill("99")
         page.evaluate("coramp.ready")
         assert "positioning error: 99 is out of range" in page.get_by_role("alert").inner_text()

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from coramp.records.schemas import RUNS
-from coramp.report.baseline_figure import baseline_figure
+from coramp.report.baseline_figure import KINDS, POPULATIONS, baseline_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.front_figure import front_figure
 from coramp.strategies.registry import strategies
@@ -138,6 +138,15 @@ def test_the_figure_of_the_front_joins_who_is_on_it(field):
     # ocbf: 0.75 s and 45 ml; game: (2 + 3) / 2 x 3/4 + 1/4 s and 40 ml
     assert joined.get_xdata().tolist() == pytest.approx([0.75, 2.125])
     assert joined.get_ydata().tolist() == pytest.approx([45.0, 40.0])
+
+
+def test_strategies_that_coincide_are_told_in_the_front(field):
+    as_game = field.filter(strategy="game").with_columns(strategy=pl.lit("slots"))
+    axes = front_figure(pl.concat([field, as_game])).axes[0]
+    told = [text.get_text() for text in axes.texts]
+    assert "2 coincide:\ngame*\nslots*" in told or "2 coincide:\nslots*\ngame*" in told
+    assert "OCBF*" in told
+    assert len([line for line in axes.get_lines() if line.get_gid() == "ring"]) == 1
 
 
 def test_a_delay_below_none_is_drawn_too(field):
@@ -286,3 +295,9 @@ def test_the_baseline_study_has_all_combinations():
     assert len(set(automated)) == 3 * 2
     assert sum(name.startswith("credible") for name, _ in settings) == 2 * 4
     assert not math.isnan(count_runs(study, 3))
+
+
+def test_no_two_kinds_of_the_baseline_figure_share_colour_and_marker():
+    drawn = [(colour, marker) for _, colour, marker, _ in KINDS.values()]
+    drawn += [(colour, marker) for colour, marker, _ in POPULATIONS.values()]
+    assert len(set(drawn)) == len(drawn)

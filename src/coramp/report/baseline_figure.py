@@ -7,10 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coramp.report.style import (
+    BLACK,
     BLUE,
     GREEN,
+    GREY,
     ORANGE,
     PURPLE,
+    SKY,
     VERMILION,
     grid,
     legend_below,
@@ -25,10 +28,10 @@ FLOW = ["mainline_veh_h", "ramp_veh_h"]
 POPULATIONS = {"paper": (VERMILION, "s", -0.2), "fair": (ORANGE, "D", 0.2)}
 AUTOMATED, UNYIELDING = "automated", "automated, no room"
 KINDS = {
-    "ACC": ("uncoordinated, ACC", VERMILION, "s", "--"),
-    "CACC": ("uncoordinated, CACC", ORANGE, "D", "-."),
+    "ACC": ("uncoordinated, ACC", SKY, "p", "--"),
+    "CACC": ("uncoordinated, CACC", BLACK, "*", "-."),
     AUTOMATED: ("automated Krauss, making room", GREEN, "v", "-"),
-    UNYIELDING: ("automated Krauss, making no room", GREEN, "v", ":"),
+    UNYIELDING: ("automated Krauss, making no room", GREY, "<", ":"),
     CONTROLLED: ("mainline priority", BLUE, "o", "-"),
     "ramp-priority": ("ramp priority", PURPLE, "^", ":"),
 }

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -36,6 +37,14 @@ CELLS = [Cell(s, None) for s in STRATEGIES] + [Cell("uncontrolled", p) for p in 
 LINEAR_TO_S = 0.1
 """Up to here the axis of delays is linear, beyond it logarithmic."""
 RUNGS = {"free": SKY, "reach": BLUE, "create": ORANGE, "delay": GREEN}
+RUNG_WORDS = {
+    "free": "free: as it is",
+    "reach": "reach: speeds up or slows down into a gap",
+    "create": "create: others make a gap",
+    "delay": "delay: a later gap",
+}
+LEAST_NAMED = 4.0
+"""The least share (%) that has its number in its bar."""
 Flows = tuple[int, int]
 
 
@@ -151,32 +160,52 @@ def _draw_printed(axes: Axes, stream: str, strategy: str, flows: Sequence[Flows]
 def rung_figure(runs: pl.DataFrame) -> Figure:
     """Returns the share (%) of merges that each rung gave, by flow, in a diagram per strategy.
 
-    Marks are the share of ramp vehicles that had to wait for a merge at least once (hold).
+    Each share from 4 % on has its number. Diamonds are the share of ramp vehicles that had to wait
+    for a merge at least once (hold); where nobody had to, the title says so.
     """
-    figure = new_figure(9.0, 3.9)
-    diagrams = figure.subplots(1, 2, sharey=True)
+    figure = new_figure(10.0, 5.2)
+    diagrams = figure.subplots(2, 1, sharex=True)
     flows = flows_of(runs)
     for axes, strategy in zip(diagrams, STRATEGIES, strict=True):
         shares, held = rung_shares(runs, strategy, flows)
         bottom = np.zeros(len(flows))
         for (rung, colour), hatch in zip(RUNGS.items(), HATCHES, strict=False):
-            axes.bar(
-                np.arange(len(flows)),
-                shares[rung],
-                bottom=bottom,
-                width=0.7,
-                color=colour,
-                hatch=hatch,
-                edgecolor="white",
-                label=rung,
-            )
+            if shares[rung].any():
+                _draw_rung(axes, rung, shares[rung], bottom, (colour, hatch))
             bottom += shares[rung]
-        axes.plot(held, color=BLACK, linestyle="none", marker="D", label="had to wait (hold)")
-        axes.set(title=look_of(strategy).label)
-        _label_flows(axes, flows)
-    diagrams[0].set_ylabel("share of ramp vehicles (%)")
+        if held.any():
+            axes.plot(held, color=BLACK, linestyle="none", marker="D", label="had to wait (hold)")
+        waited = "" if held.any() else ": nobody had to wait (hold)"
+        axes.set(title=f"{look_of(strategy).label}{waited}", ylim=(0.0, 100.0))
+        axes.set_ylabel("share of ramp vehicles (%)")
+        _label_flows(axes, flows, upright=True)
+    diagrams[0].set_xlabel("")
     legend_below(figure, diagrams, 5)
     return figure
+
+
+def _draw_rung(
+    axes: Axes, rung: str, shares: np.ndarray, bottom: np.ndarray, look: tuple[str, str]
+) -> None:
+    colour, hatch = look
+    bars = axes.bar(
+        np.arange(len(shares)),
+        shares,
+        bottom=bottom,
+        width=0.8,
+        color=colour,
+        hatch=hatch,
+        edgecolor="white",
+        label=RUNG_WORDS[rung],
+    )
+    texts = axes.bar_label(
+        bars,
+        [f"{share:.0f} %" if share >= LEAST_NAMED else "" for share in shares],
+        label_type="center",
+        fontsize=9.0,
+    )
+    for text in texts:
+        text.set_bbox({"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0})
 
 
 def rung_shares(
@@ -193,10 +222,10 @@ def rung_shares(
     return dict(zip(RUNGS, shares, strict=False)), shares[-1]
 
 
-def _label_flows(axes: Axes, flows: Sequence[Flows]) -> None:
-    axes.set_xticks(
-        range(len(flows)), [f"{m} + {r}" for m, r in flows], rotation=40, ha="right", fontsize=8
-    )
+def _label_flows(axes: Axes, flows: Sequence[Flows], upright: bool = False) -> None:
+    """Writes flows below an axis, slanted or in one line each where there is room."""
+    slant: dict[str, Any] = {} if upright else {"rotation": 40, "ha": "right"}
+    axes.set_xticks(range(len(flows)), [f"{m} + {r}" for m, r in flows], fontsize=8, **slant)
     axes.set_xlabel("flow, mainline + ramp (veh/h)")
     axes.grid(axis="y", alpha=0.3)
     axes.set_axisbelow(True)

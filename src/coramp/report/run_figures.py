@@ -9,10 +9,12 @@ from matplotlib.figure import Figure
 
 from coramp.metrics.motion import BIN_S
 from coramp.records.run import RunRecords
-from coramp.report.style import BLACK, grid, legend_below, look_of, new_figure
+from coramp.report.style import BLACK, COLOURS, LINES, grid, legend_below, look_of, new_figure
 
 SMOOTH_S = 60
 """Over how many bins of 1 s the bold lines are means, each bin weighed by its vehicles."""
+SAME_SHARE = 0.02
+"""Distributions that are nowhere further apart are drawn as one."""
 
 
 def speed_figure(runs: Sequence[RunRecords], stream: str) -> Figure:
@@ -87,42 +89,72 @@ def margin_figure(runs: Sequence[RunRecords], allowance_m: float) -> Figure:
 
     The margin of a decision is the least of all vehicles that it changes to all others, as the
     checker computed it before the plan was committed; it asks for ``allowance_m`` of every plan.
-    A diagram a ramp flow, a line a strategy, decisions of all seeds together.
+    A line a ramp flow and strategy, decisions of all seeds together; strategies whose lines are
+    nowhere further than ``SAME_SHARE`` apart are one line, which says so.
     """
     cooperative = [run for run in runs if run.decisions is not None]
     ramps = sorted({run.content["ramp_veh_h"] for run in cooperative})
-    figure = new_figure(9.0, 3.5)
-    diagrams = figure.subplots(1, len(ramps), sharex=True, sharey=True, squeeze=False)[0]
-    for axes, ramp in zip(diagrams, ramps, strict=True):
+    figure = new_figure(8.4, 4.6)
+    axes = figure.subplots()
+    for k, ramp in enumerate(ramps):
         here = [run for run in cooperative if run.content["ramp_veh_h"] == ramp]
-        for strategy in dict.fromkeys(run.content["strategy"] for run in here):
-            look = look_of(strategy)
-            margins_m, shares = margin_distribution(
-                [r for r in here if r.content["strategy"] == strategy]
-            )
+        for number, (label, together) in enumerate(_coinciding(here)):
+            margins_m, shares = margin_distribution(together)
             axes.step(
                 margins_m,
                 100.0 * shares,
                 where="post",
-                color=look.colour,
-                linestyle=look.line,
-                linewidth=look.width_pt,
-                label=look.label,
+                color=COLOURS[k % len(COLOURS)],
+                linestyle=LINES[(k + 2 * number) % len(LINES)],
+                linewidth=1.8,
+                label=f"{here[0].flows}: {label}",
             )
-        axes.axvline(
-            allowance_m, color=BLACK, linewidth=0.9, linestyle="--", label="what the checker asks"
-        )
-        axes.set(
-            title=here[0].flows,
-            xscale="log",
-            xlabel="margin over the safe distance (m)",
-            ylim=(0.0, 101.0),
-        )
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    grid(*diagrams)
-    diagrams[0].set_ylabel("decisions with at most this margin (%)")
-    legend_below(figure, diagrams, 3)
+    axes.axvline(allowance_m, color=BLACK, linewidth=1.0, linestyle="--")
+    axes.text(
+        allowance_m,
+        99.0,
+        f" {allowance_m:g} m, the least that\n the checker lets pass",
+        va="top",
+        fontsize=8.5,
+    )
+    axes.set(
+        xscale="log",
+        xlabel="margin over the safe distance (m)",
+        ylabel="decisions with at most this margin (%)",
+        ylim=(0.0, 101.0),
+    )
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    grid(axes)
+    legend_below(figure, [axes], 1)
     return figure
+
+
+def _coinciding(runs: Sequence[RunRecords]) -> list[tuple[str, list[RunRecords]]]:
+    """Groups of runs whose strategies' lines lie on each other, with what the group is called."""
+    groups: list[tuple[list[str], list[RunRecords]]] = []
+    for strategy in dict.fromkeys(run.content["strategy"] for run in runs):
+        own = [run for run in runs if run.content["strategy"] == strategy]
+        for names, known in groups:
+            if _apart(margin_distribution(own), margin_distribution(known)) <= SAME_SHARE:
+                names.append(look_of(strategy).label)
+                known.extend(own)
+                break
+        else:
+            groups.append(([look_of(strategy).label], own))
+    return [
+        (" and ".join(names) + (" coincide" if len(names) > 1 else ""), together)
+        for names, together in groups
+    ]
+
+
+def _apart(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> float:
+    """The largest difference of two shares at one margin; margins count in whole millimetres."""
+    margins_m = np.round(np.concatenate((one[0], other[0])), 3)
+    shares = [
+        np.concatenate(([0.0], share))[np.searchsorted(np.round(m, 3), margins_m, side="right")]
+        for m, share in (one, other)
+    ]
+    return float(np.abs(shares[0] - shares[1]).max(initial=0.0))
 
 
 def margin_distribution(runs: Sequence[RunRecords]) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from coramp.report.style import BLACK, COLOURS, LINES, MARKERS, grid, legend_bel
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.overrides import overrides_of
 from coramp.studies.sensitivity_layout import BREAKDOWN_DELAY_S
-from coramp.studies.statistics import estimate
+from coramp.studies.statistics import Estimate, estimate
 
 STREAMS = ("mainline", "ramp")
 KEYS = {
@@ -23,34 +23,107 @@ KEYS = {
     "safety.standstill_gap_m": "standstill gap (m)",
 }
 """What the keys of the built-in study are called; others keep their names."""
+FLAT_S = 0.5
+"""By so much at most the mean delays of a setting differ that shares its diagram with others."""
 Settings = list[tuple[float, str | None]]
 
 
 def sensitivity_figure(runs: pl.DataFrame) -> Figure:
     """Returns mean delay (s) over each setting that varies, with 95 % intervals over seeds.
 
-    A column of diagrams a setting, a row a stream, a line a flow; the broken line is the 5 s
-    beyond which a merge counts as broken down.
+    A column of diagrams a setting, a row a stream, a line a flow. Settings over which no delay
+    changes by more than ``FLAT_S`` share the first column: there a line goes from the least to the
+    largest delay over all values of the setting. The broken line, named in the diagrams, is the
+    delay beyond which a merge counts as broken down.
     """
     settings = settings_of(runs)
-    figure = new_figure(max(4.0, 2.6 * len(settings) + 0.6), 5.6)
-    diagrams = figure.subplots(2, len(settings), sharex="col", sharey=True, squeeze=False)
-    flows = sorted(runs.select("mainline_veh_h", "ramp_veh_h").unique().iter_rows())
+    flat = [key for key, values in settings.items() if _is_flat(runs, values)]
+    flat = flat if len(flat) > 1 else []
+    others = [key for key in settings if key not in flat]
+    columns = len(others) + bool(flat)
+    widths = [1.3] * bool(flat) + [1.0] * len(others)
+    figure = new_figure(max(5.0, 3.4 * sum(widths) + 0.8), 6.2)
+    diagrams = figure.subplots(
+        2, columns, sharex="col", sharey=True, squeeze=False, width_ratios=widths
+    )
     for row, stream in zip(diagrams, STREAMS, strict=True):
-        for axes, values in zip(row, settings.values(), strict=True):
-            for k, pair in enumerate(flows):
-                _draw_line(axes, runs, values, (f"{stream}_delay_s", pair), k)
-            axes.axhline(BREAKDOWN_DELAY_S, color=BLACK, linestyle=(0, (6, 4)), linewidth=0.8)
-            axes.set_yscale("symlog", linthresh=0.1, linscale=0.5)
-            axes.set_xticks(range(len(values)), [f"{value:g}" for value, _ in values], fontsize=8)
-            grid(axes)
+        if flat:
+            _draw_flat(row[0], runs, {key: settings[key] for key in flat}, stream)
+        for axes, key in zip(row[bool(flat) :], others, strict=True):
+            _draw_setting(axes, runs, settings[key], stream)
+        for axes in row:
+            _finish(axes)
         row[0].set_ylabel(f"mean {stream} delay (s)")
-    for axes, key in zip(diagrams[-1], settings, strict=True):
+    for axes, key in zip(diagrams[-1][bool(flat) :], others, strict=True):
         axes.set_xlabel(KEYS.get(key, key))
     diagrams[0, 0].set_ylim(bottom=0.0)
     diagrams[0, 0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    legend_below(figure, diagrams.flat, 5)
+    legend_below(figure, diagrams.flat, 3 if columns < 3 else 5)
     return figure
+
+
+def _flows_of(runs: pl.DataFrame) -> list[tuple[float, float]]:
+    return sorted(runs.select("mainline_veh_h", "ramp_veh_h").unique().iter_rows())
+
+
+def _is_flat(runs: pl.DataFrame, values: Settings) -> bool:
+    """Whether no mean delay changes by more than ``FLAT_S`` over a setting."""
+    for pair in _flows_of(runs):
+        for stream in STREAMS:
+            means = [e.mean for e in _estimates(runs, values, (f"{stream}_delay_s", pair))]
+            known = [mean for mean in means if not math.isnan(mean)]
+            if known and max(known) - min(known) > FLAT_S:
+                return False
+    return True
+
+
+def _draw_setting(axes: Axes, runs: pl.DataFrame, values: Settings, stream: str) -> None:
+    for k, pair in enumerate(_flows_of(runs)):
+        _draw_line(axes, runs, values, (f"{stream}_delay_s", pair), k)
+    axes.set_xticks(range(len(values)), [f"{value:g}" for value, _ in values], fontsize=8)
+
+
+def _draw_flat(axes: Axes, runs: pl.DataFrame, settings: dict[str, Settings], stream: str) -> None:
+    """Draws a bar a setting and flow, from the least to the largest mean delay, with the middle."""
+    flows = _flows_of(runs)
+    for k, pair in enumerate(flows):
+        ranges = []
+        for values in settings.values():
+            means = [e.mean for e in _estimates(runs, values, (f"{stream}_delay_s", pair))]
+            ranges.append((min(means), max(means)))
+        middles = [0.5 * (low + high) for low, high in ranges]
+        axes.errorbar(
+            [place + 0.13 * (k - 0.5 * (len(flows) - 1)) for place in range(len(settings))],
+            middles,
+            yerr=[0.5 * (high - low) for low, high in ranges],
+            color=COLOURS[k % len(COLOURS)],
+            marker=MARKERS[k % len(MARKERS)],
+            linestyle="",
+            label=f"{pair[0]:g} + {pair[1]:g} veh/h",
+        )
+    names = []
+    for key, values in settings.items():
+        word, _, unit = KEYS.get(key, key).partition(" (")
+        unit = "" if unit in ("", "no unit)") else f" {unit.removesuffix(')')}"
+        names.append(f"{word},\n{values[0][0]:g} to {values[-1][0]:g}{unit}")
+    axes.set_xticks(range(len(settings)), names, fontsize=8)
+    axes.set_xlim(-0.5, len(settings) - 0.5)
+    axes.set_title(f"{stream}: no delay changes by more than {FLAT_S:g} s", fontsize=8.5)
+
+
+def _finish(axes: Axes) -> None:
+    """The scale, the grid, and the named line of breakdown."""
+    axes.axhline(BREAKDOWN_DELAY_S, color=BLACK, linestyle=(0, (6, 4)), linewidth=0.8)
+    axes.annotate(
+        f"{BREAKDOWN_DELAY_S:g} s: broken down above",
+        (0.0, BREAKDOWN_DELAY_S),
+        (4.0, 2.0),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        fontsize=7.5,
+    )
+    axes.set_yscale("symlog", linthresh=0.1, linscale=0.5)
+    grid(axes)
 
 
 def settings_of(runs: pl.DataFrame) -> dict[str, Settings]:
@@ -79,17 +152,14 @@ def _looked_up(data: Any, dotted: str) -> float:
     return float(data)
 
 
-def _draw_line(
-    axes: Axes,
-    runs: pl.DataFrame,
-    values: Settings,
-    which: tuple[str, Sequence[float]],
-    k: int,
-) -> None:
+def _estimates(
+    runs: pl.DataFrame, values: Settings, which: tuple[str, Sequence[float]]
+) -> list[Estimate]:
+    """The mean over seeds of a column at a flow, for each value of a setting."""
     column, (mainline, ramp) = which
     at_flow = runs.filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
     overrides = pl.col("overrides")
-    found = [
+    return [
         estimate(
             at_flow.filter(overrides.is_null() if text is None else overrides == text)[column]
             .drop_nulls()
@@ -97,6 +167,17 @@ def _draw_line(
         )
         for _, text in values
     ]
+
+
+def _draw_line(
+    axes: Axes,
+    runs: pl.DataFrame,
+    values: Settings,
+    which: tuple[str, Sequence[float]],
+    k: int,
+) -> None:
+    mainline, ramp = which[1]
+    found = _estimates(runs, values, which)
     axes.errorbar(
         range(len(values)),
         [e.mean for e in found],

@@ -5,6 +5,7 @@ differ as well, so that a print in grey can be read.
 """
 
 import io
+import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,13 +57,13 @@ class Look:
 UNCONTROLLED = {
     "paper": Look("no control, paper's drivers", VERMILION, "s", "--"),
     "fair": Look("no control, fair drivers", ORANGE, "D", "-."),
-    "paper-sigma0": Look("no control, paper's drivers, no noise", GREEN, "v", "--"),
-    "fair-sigma0": Look("no control, fair drivers, no noise", SKY, "P", "-."),
+    "paper-sigma0": Look("no control, paper's drivers, no noise", VERMILION, "v", "--"),
+    "fair-sigma0": Look("no control, fair drivers, no noise", ORANGE, "P", "-."),
     "credible": Look("no control, credible drivers", BLACK, "X", "--"),
     "credible-uniform": Look("no control, credible drivers, all alike", GREY, "X", "-."),
-    "automated-0.6": Look("no control, automated at 0.6 s", SKY, "v", ":"),
-    "automated-0.8": Look("no control, automated at 0.8 s", GREEN, "v", ":"),
-    "automated-1.0": Look("no control, automated at 1.0 s", PURPLE, "v", ":"),
+    "automated-0.6": Look("no control, automated at 0.6 s", SKY, "<", ":"),
+    "automated-0.8": Look("no control, automated at 0.8 s", GREEN, "<", ":"),
+    "automated-1.0": Look("no control, automated at 1.0 s", PURPLE, "<", ":"),
 }
 COOPERATIVE = {
     "mainline-priority": Look("mainline priority", BLUE, "o", "-", 2.8),
@@ -70,7 +71,7 @@ COOPERATIVE = {
     "fifo-optimal-control": Look("FIFO optimal control", GREEN, "v", "--"),
     "dp-sequence": Look("DP sequence", SKY, "P", "-."),
     "milp-sequence": Look("MILP sequence", VERMILION, "X", ":"),
-    "game": Look("game", ORANGE, "D", "--"),
+    "game": Look("game", PURPLE, "p", "--"),
     "virtual-platoon": Look("virtual platoon", BLACK, "s", "-."),
     "ocbf": Look("OCBF", GREY, "*", "--"),
     "slots": Look("slots", VERMILION, "o", "-"),
@@ -78,14 +79,28 @@ COOPERATIVE = {
 METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
 
 
+FREE_MARKERS = "h>d1"
+"""Markers that no known strategy has, for those that are not known."""
+
+
 def look_of(strategy: str, drivers: str | None = None) -> Look:
-    """Returns how a strategy is drawn; an unknown one is black, with its own name."""
+    """Returns how a strategy is drawn; no two that are known share colour and marker.
+
+    One that is not known has its own name, a marker that no known one has, and always the same
+    look.
+    """
     if drivers is not None and strategy == "uncontrolled":
         known = UNCONTROLLED.get(drivers)
     else:
         known = COOPERATIVE.get(strategy) or METERED.get(strategy)
     name = f"{strategy} ({drivers})" if drivers else strategy
-    return known or Look(name, BLACK, "X", "-")
+    return known or _look_of_another(name)
+
+
+def _look_of_another(name: str) -> Look:
+    number = zlib.crc32(name.encode())
+    marker = FREE_MARKERS[number // len(COLOURS) % len(FREE_MARKERS)]
+    return Look(name, COLOURS[number % len(COLOURS)], marker, LINES[number % len(LINES)])
 
 
 def _use_our_settings() -> None:

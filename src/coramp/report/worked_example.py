@@ -88,7 +88,7 @@ def time_space_figure(planned: PlannedSnapshot) -> Figure:
             else:
                 draw_acceleration_lane(diagram, planned)
             name_lines(diagram)
-    legend_below(figure, axes.flat, 5)
+    legend_below(figure, axes.flat, 3)
     return figure
 
 

@@ -15,8 +15,9 @@ from coramp.records.run import RunRecords
 from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
 from coramp.report.page.shown import page_data
+from coramp.report.style import look_of
 from coramp.runs.running import RunSpec, recorded
-from coramp.studio.dials import NOTHING, Studio
+from coramp.studio.dials import DECIDING, NOTHING, Studio
 
 Played = tuple[RunRecords, str]
 """A run, and what the page's scripts take for it."""
@@ -47,9 +48,11 @@ class Answers:
             ("studio.js",),
             title=f"Studio: {studio.scenario.name}",
             subtitle=studio.scenario.description,
-            dials=studio.dials,
+            dials=[dial for dial in studio.dials if dial.name in DECIDING],
+            folded=[dial for dial in studio.dials if dial.name not in DECIDING],
+            chosen=studio.chosen,
             start=studio.start,
-            choices=[(name, name.replace(":", ", drivers ")) for name in studio.choices],
+            choices=[(name, _called(name)) for name in studio.choices],
             nothing=NOTHING,
             runs={},
             cells=[],
@@ -113,6 +116,12 @@ class Answers:
             f"coramp run {self.saved_name}.toml --strategy {spec.strategy} "
             f"--engine {spec.engine}{drivers} --seed {spec.seed}"
         )
+
+
+def _called(choice: str) -> str:
+    """What a choice is called in figures and in the replay."""
+    strategy, _, drivers = choice.partition(":")
+    return look_of(strategy, drivers or None).label
 
 
 def _plain(line: str) -> str:

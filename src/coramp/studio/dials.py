@@ -56,16 +56,21 @@ class Dial:
 
 
 DIALS = (
+    Dial("gap", "safety.time_gap_s", "time gap", "s", 0.0, 2.0, 0.1),
     Dial("mainline", "mainline.flow_veh_h", "mainline flow", "veh/h", 0.0, 4000.0, 50.0),
     Dial("ramp", "ramp.flow_veh_h", "ramp flow", "veh/h", 0.0, 1800.0, 25.0),
+    Dial("lane", "ramp.acceleration_lane_m", "acceleration lane", "m", 50.0, 390.0, 5.0),
     Dial("mainline_speed", "mainline.speed_mps", "mainline speed", "m/s", 12.0, 36.0, 0.5),
     Dial("ramp_speed", "ramp.speed_mps", "ramp speed", "m/s", 8.0, 34.0, 0.5),
-    Dial("lane", "ramp.acceleration_lane_m", "acceleration lane", "m", 50.0, 390.0, 5.0),
+    Dial("standstill", "safety.standstill_gap_m", "standstill gap", "m", 0.0, 5.0, 0.1),
     Dial("error", "safety.positioning_error_m", "positioning error", "m", 0.0, 3.0, 0.02),
     Dial("horizon", "simulation.horizon_s", "time of arrivals", "s", 30.0, 1800.0, 30.0),
     Dial("seed", "", "seed", "", 0.0, 10_000.0, 1.0),
 )
+DECIDING = ("gap", "mainline", "ramp", "lane")
+"""The dials that decide most; the page shows these at once and folds the others."""
 CHOICES = ("strategy", "second")
+USUAL_DRIVERS = "fair"
 
 
 @dataclass(frozen=True)
@@ -101,13 +106,21 @@ class Studio:
             ),
         ]
 
+    @property
+    def chosen(self) -> dict[str, str]:
+        """What is chosen at first: a cooperative strategy, and drivers beside it."""
+        usual = f"uncontrolled:{USUAL_DRIVERS}"
+        drivers = [name for name in self.choices if name.startswith("uncontrolled:")]
+        second = usual if usual in drivers else next(iter(drivers), NOTHING)
+        return {"strategy": self.choices[0], "second": second}
+
     def specs(self, asked: Mapping[str, str]) -> list[RunSpec]:
         """Returns the runs that an address asks for, one or two, on the same arrivals.
 
         Raises CorampError with a message for each thing that is wrong.
         """
         values = self._values(asked)
-        names = [asked.get("strategy", self.choices[0]), asked.get("second", NOTHING)]
+        names = [asked.get(choice, self.chosen[choice]) for choice in CHOICES]
         wanted = [name for name in dict.fromkeys(names) if name != NOTHING]
         if not wanted:
             raise CorampError("strategy: nothing is chosen; choose one")

@@ -3,6 +3,7 @@
 import errno
 import socket
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -142,6 +143,8 @@ def serve(scenario: str, port: int, say: Callable[[str], None]) -> None:
     Raises CorampError for a scenario that is not valid and for a port that cannot be taken.
     """
     with StudioServer(scenario, port) as server:
+        # The first picture is computed while the browser opens.
+        threading.Thread(target=server.answers.runs, args=({},), daemon=True).start()
         say(server.address)
         try:
             server.serve_forever()

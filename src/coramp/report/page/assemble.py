@@ -15,7 +15,16 @@ from coramp.report.page.shown import page_data
 
 LIBRARY = "uplot-1.6.32.min.js"
 STYLES = ("uplot-1.6.32.min.css", "page.css")
-SCRIPTS = ("motion.js", "details.js", "diagram.js", "replay.js", "page.js")
+SCRIPTS = (
+    "motion.js",
+    "details.js",
+    "diagram.js",
+    "delay.js",
+    "looks.js",
+    "road.js",
+    "replay.js",
+    "page.js",
+)
 REPORT_SCRIPTS = ("report.js",)
 
 

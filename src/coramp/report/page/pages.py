@@ -1,6 +1,7 @@
 """The pages of runs: report and replay of one run, or of several on the same arrivals."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
@@ -216,15 +217,21 @@ def comparison_table(runs: Sequence[RunRecords], unit: SpeedUnit = MPS) -> Table
         *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
     ]
     rows = tuple(
-        (text, *(number(_shown(run.summary.get(key), key, unit), digits) for run in runs))
+        (text, *(number(_shown(_computed(run, key), key, unit), digits) for run in runs))
         for text, key, digits in lines
-        if any(run.summary.get(key) is not None for run in runs)
+        if any(_computed(run, key) is not None for run in runs)
     )
     return Table("Figures", ("what", *(title_of(run) for run in runs)), rows)
 
 
 def _shown(value: float | None, key: str, unit: SpeedUnit) -> float | None:
     return unit.of(value) if key.endswith("_speed_mps") else value
+
+
+def _computed(run: RunRecords, key: str) -> Any:
+    """A figure of a run, None where it was not computed: the exact engine drives no plan."""
+    drives = run.summary["engine"] == "sumo"
+    return run.summary.get(key) if drives or key != "plan_error_m" else None
 
 
 def _how_sure(runs: Sequence[RunRecords]) -> list[str]:

@@ -51,8 +51,12 @@ def page_data(run: RunRecords) -> Row:
         "on_ramp": [int(stream == "ramp") for stream in run.vehicles["stream"].to_list()],
         "length": _lengths_m(run),
         "type": _types(run),
+        "position_error": run.vehicles["positioning_error_m"].to_list(),
+        "clock_error": run.vehicles["clock_error_s"].to_list(),
+        "time_gap": run.vehicles["time_gap_s"].to_list(),
         "scheduled": _rounded(run.vehicles["scheduled_s"].to_list()),
         "exit": _rounded(exits_s),
+        "free": _rounded(run.vehicles["free_flow_s"].to_list()),
         "merge": _rounded(merge_s),
         "first": first,
         "pieces": pieces,
@@ -83,6 +87,8 @@ def road_data(scenario: Scenario) -> Row:
         "merge_angle_deg": scenario.ramp.merge_angle_deg,
         "decision_m": scenario.decision_station_m,
         "v0_mps": scenario.mainline.speed_mps,
+        "ramp_mps": scenario.ramp.speed_mps,
+        "free_accel_mps2": scenario.motion.free_acceleration_mps2,
     }
 
 

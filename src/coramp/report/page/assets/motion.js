@@ -67,19 +67,21 @@ coramp.situation = (run, time) => {
     lane.forEach((vehicle, place) => {
       const front = lane[place - 1];
       vehicle.gap = front ? front.station - run.length[front.i] - vehicle.station : null;
-      vehicle.needed = front ? coramp.safeDistance(run, front.speed, vehicle.speed) : null;
+      vehicle.needed = front ? coramp.safeDistance(run, front, vehicle) : null;
     });
   });
   return lanes;
 };
 
-// L_safe = 2 L_1 + L_2 + L_3 (Eq. 1 to 3), and the time and standstill gaps of the scenario; in m.
-coramp.safeDistance = (run, frontSpeed, rearSpeed) => {
+// L_safe = 2 L_1 + L_2 + L_3 (Eq. 1 to 3) of a pair, with each vehicle's own errors and the
+// follower's time gap, and the standstill gap of the scenario; in m.
+coramp.safeDistance = (run, front, rear) => {
   const s = run.safety;
-  const closing = 3.6 * Math.max(0, rearSpeed - frontSpeed);
-  return 2 * s.positioning_error_m + s.clock_error_s * (frontSpeed + rearSpeed)
-    + (closing * closing) / (254 * (s.adhesion + s.resistance)) + s.time_gap_s * rearSpeed
-    + s.standstill_gap_m;
+  const closing = 3.6 * Math.max(0, rear.speed - front.speed);
+  return run.position_error[front.i] + run.position_error[rear.i]
+    + run.clock_error[front.i] * front.speed + run.clock_error[rear.i] * rear.speed
+    + (closing * closing) / (254 * (s.adhesion + s.resistance))
+    + run.time_gap[rear.i] * rear.speed + s.standstill_gap_m;
 };
 
 // How many are due but still outside.

@@ -8,8 +8,8 @@ coramp.Show = class {
     const replayBox = element('div');
     this.details = element('div', { class: 'detail-box', 'aria-live': 'polite' },
       element('p', { class: 'hint' }, 'Point at a vehicle, or choose one, to see its decision.'));
-    box.append(element('h3', {}, 'Replay'), replayBox,
-      element('h3', {}, 'Time-space diagram'), coramp.legend());
+    const heading = document.querySelector('h2') ? 'h3' : 'h2';
+    box.append(replayBox, this.details, element(heading, {}, 'Time-space diagram'), coramp.legend());
     this.diagrams = runs.map((run) => {
       const diagramBox = element('figure', {}, element('figcaption', {}, run.title));
       box.append(diagramBox);
@@ -18,11 +18,11 @@ coramp.Show = class {
         ontime: (time) => { this.replay.pause(); this.replay.seek(time); },
       });
     });
-    box.append(this.details);
     this.replay = new coramp.Replay(runs, replayBox, {
       ontime: (time) => this.diagrams.forEach((diagram) => diagram.setTime(time)),
       onselect: (run, i) => this.diagrams[runs.indexOf(run)].select(i),
     }, before?.replay ?? null);
+    box.append(this.replay.bar);
     this.diagrams.forEach((diagram) => {
       const { x, y } = before?.window ?? {};
       if (before) diagram.show([x[0], Math.min(x[1], diagram.full.x[1])], y);

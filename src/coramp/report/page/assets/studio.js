@@ -35,6 +35,8 @@ coramp.Studio = class {
   read(address) {
     const known = [...address].filter(([name]) => this.controls.has(name));
     this.set(Object.fromEntries(known));
+    const folded = document.getElementById('folded');
+    if (known.some(([name]) => folded.contains(this.controls.get(name)))) folded.open = true;
     this.strange = [...address].filter(([name]) => !this.controls.has(name));
     known.forEach(([name, value]) => {
       if (this.controls.get(name).value !== value) this.strange.push([name, value]);
@@ -77,10 +79,13 @@ coramp.Studio = class {
     while (this.wanted !== null) {
       const asked = this.wanted;
       this.wanted = null;
+      const first = coramp.shown === undefined && this.values().second !== 'nothing';
       const started = performance.now();
       const slow = setTimeout(() => { status.textContent = 'computing …'; }, 300);
       try {
-        this.show(await (await fetch(`runs?${asked}`)).json());
+        // The first picture does not wait for the drivers beside it.
+        if (first) this.show(await this.told(this.alone(asked)));
+        this.show(await this.told(asked));
         this.took_ms = performance.now() - started;
         status.textContent = `computed and drawn in ${this.took_ms.toFixed(0)} ms`;
       } catch (error) {
@@ -94,14 +99,23 @@ coramp.Studio = class {
     this.busy = false;
   }
 
+  async told(asked) { return (await fetch(`runs?${asked}`)).json(); }
+
+  // The same question without what stands beside.
+  alone(asked) {
+    const question = new URLSearchParams(asked);
+    question.set('second', 'nothing');
+    return question;
+  }
+
   tell(problems) {
     const { element } = coramp;
     document.getElementById('problems').replaceChildren(...problems.map((line) =>
       element('p', { role: 'alert', class: 'problem' }, line)));
     const save = document.getElementById('save');
     if (problems.length) save.removeAttribute('href');
-    ['answer', 'show', 'figures'].forEach((id) =>
-      document.getElementById(id).classList.toggle('stale', problems.length > 0));
+    // What was computed before does not belong to what is set now, and goes out of sight.
+    document.getElementById('results').hidden = problems.length > 0;
   }
 
   show(told) {
