@@ -1,5 +1,7 @@
 """Types of vehicles in a scenario: what is drawn, what is refused in a line, what is warned of."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,7 @@ def written(tmp_path, *parts, name="expressway"):
 def test_an_arrival_of_an_unknown_type_is_refused(tmp_path):
     arrival = '[[arrivals]]\nstream = "ramp"\ntime_s = 1.0\nspeed_mps = 16.0\ntype = "bus"\n'
     path = written(tmp_path, toml_of([CAR, TRUCK]), arrival)
+    path.write_text(re.sub(r"flow_veh_h = .*\n", "", path.read_text()))
     told = invoke("run", path, "--horizon", "10", "--engine", "exact")
     assert_refused(told)
     assert told.errors == [
@@ -273,8 +276,7 @@ def test_explicit_arrivals_have_the_type_length_and_top_speed_that_they_say():
         {**arrival, "time_s": 5.0, "type": "truck"},
         {**arrival, "time_s": 9.0, "type": "truck", "top_speed_mps": 20.0, "length_m": 12.0},
     ]
-    flows = {"mainline.flow_veh_h": 0.0, "ramp.flow_veh_h": 0.0}
-    car, usual, slow = arrivals_of(scenario_with(CAR, TRUCK, arrivals=told, **flows), 1)
+    car, usual, slow = arrivals_of(scenario_with(CAR, TRUCK, arrivals=told), 1)
     assert (car.vehicle_type, car.length_m, car.speed_mps) == ("car", 5.0, 27.0)
     assert usual.traits.top_speed_mps == pytest.approx(85.0 / 3.6)  # the middle of its range
     assert usual.speed_mps == usual.traits.top_speed_mps

@@ -139,7 +139,10 @@ def test_the_figure_has_a_line_for_each_combination():
     figure = capacity_figure(runs)
     (axes,) = figure.axes
     (line,) = [c for c in axes.containers if c.get_label() == "mainline priority, Eq. 1"]
-    assert line[0].get_xydata().tolist() == [[500.0, 1500.0], [800.0, 2000.0]]
+    assert line[0].get_xydata()[0].tolist() == [500.0, 1500.0]
+    assert math.isnan(line[0].get_xydata()[1, 1])  # a limit of the search is no result
+    limits = [drawn for drawn in axes.lines if drawn.get_gid() == "search limit above"]
+    assert [drawn.get_xydata().tolist() for drawn in limits] == [[[800.0, 2000.0]]]
 
 
 def test_a_small_capacity_study_runs_and_goes_on(tmp_path):

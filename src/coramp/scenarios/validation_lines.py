@@ -51,7 +51,8 @@ def _problems_without(
 def _table_of(data: Mapping[str, Any], location: tuple[int | str, ...]) -> Any:
     table: Any = data
     for part in location[:-1]:
-        table = table[part]
+        if part not in SHAPES:
+            table = table[part]
     return table
 
 
@@ -139,7 +140,11 @@ def _near_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[
 
 def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """The keys that a table may have in which a key lies."""
+    inner: Any = None
     for part in location[:-1]:
+        if part in SHAPES:
+            model = _model_within(_shape_of(inner, str(part))) or model
+            continue
         field = model.model_fields.get(str(part))
         inner = field.annotation if field is not None else None
         if isinstance(inner, type) and issubclass(inner, BaseModel):
@@ -147,6 +152,14 @@ def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[st
         elif not isinstance(part, int):
             model = _model_within(inner) or model
     return sorted(model.model_fields)
+
+
+def _shape_of(annotation: Any, tag: str) -> Any:
+    """The one of several shapes of a value that has a tag of ``SHAPES``."""
+    for shape in getattr(annotation, "__args__", ()):
+        if any(getattr(mark, "tag", None) == tag for mark in getattr(shape, "__metadata__", ())):
+            return shape
+    return None
 
 
 def _model_within(annotation: Any) -> type[BaseModel] | None:
