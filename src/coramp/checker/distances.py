@@ -225,15 +225,16 @@ class Envelope(NamedTuple):
 @kernel
 def envelope_of(pieces: FloatArray, from_s: float, v0_mps: float) -> Envelope:
     """Returns the envelope of a trajectory from ``from_s`` on."""
-    s, v, _ = state_at(pieces, from_s)
+    last = pieces.shape[0] - 1
+    under_way = last  # most vehicles drive their last piece
+    while under_way > 0 and pieces[under_way, 0] > from_s:
+        under_way -= 1
+    s, v, _ = state_at(pieces[under_way:], from_s)
     lowest_m = highest_m = s - v0_mps * from_s
     slowest = fastest = v
-    last = pieces.shape[0] - 1
-    for k in range(last + 1):
+    for k in range(under_way, last + 1):
         t, s, v, a = pieces[k]
         ends_s = math.inf if k == last else pieces[k + 1, 0]
-        if ends_s <= from_s:
-            continue
         if t > from_s:
             lowest_m, highest_m = min(lowest_m, s - v0_mps * t), max(highest_m, s - v0_mps * t)
             slowest, fastest = min(slowest, v), max(fastest, v)

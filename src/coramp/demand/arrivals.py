@@ -93,13 +93,17 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
     numbers = (count(1), count(1))
     given.sort(key=IN_ORDER)
     return [
-        Arrival(_name(on_ramp, next(numbers[on_ramp])), on_ramp, step, mps, length_m, kind, traits)
+        Arrival(
+            f"{'mr'[on_ramp]}{next(numbers[on_ramp]):05d}",
+            on_ramp,
+            step,
+            mps,
+            length_m,
+            kind,
+            traits,
+        )
         for step, on_ramp, mps, length_m, kind, traits in given
     ]
-
-
-def _name(on_ramp: bool, number: int) -> str:
-    return f"{'r' if on_ramp else 'm'}{number:05d}"
 
 
 Unnamed = tuple[int, bool, float, float, str, Traits | None]

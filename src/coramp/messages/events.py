@@ -1,5 +1,6 @@
 """What a world tells the coordinator. Step k of the control clock is at ``k * step_s``."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +20,24 @@ class RequestToEnter(NamedTuple):
     length_m: float
     vehicle_type: str = CAR
     traits: Traits | None = None
+
+
+class RequestColumns(NamedTuple):
+    """The fields of ``RequestToEnter``, each with one entry a request."""
+
+    vehicle_id: tuple[str, ...]
+    on_ramp: tuple[bool, ...]
+    step: tuple[int, ...]
+    speed_mps: tuple[float, ...]
+    length_m: tuple[float, ...]
+    vehicle_type: tuple[str, ...]
+    traits: tuple[Traits | None, ...]
+
+
+def columns_of(requests: Sequence[RequestToEnter]) -> RequestColumns:
+    """Returns the requests column by column."""
+    fields = len(RequestToEnter._fields)
+    return RequestColumns(*(zip(*requests, strict=True) if requests else [()] * fields))
 
 
 @dataclass(frozen=True, slots=True)

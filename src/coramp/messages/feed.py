@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.messages.events import RequestToEnter
+from coramp.messages.events import RequestToEnter, columns_of
 from coramp.vehicles.traits import LENGTH, Traits
 
 
@@ -32,12 +32,12 @@ class RequestFeed:
 
     def __init__(self, requests: Iterable[RequestToEnter] = ()) -> None:
         self._list = list(requests)
-        listed = self._list
+        columns = columns_of(self._list)
         self.arrays = Requests(
-            np.array([request.step for request in listed], np.int64),
-            np.array([request.on_ramp for request in listed], np.bool_),
-            np.array([request.speed_mps for request in listed], np.float64),
-            _traits_rows(listed),
+            np.array(columns.step, np.int64),
+            np.array(columns.on_ramp, np.bool_),
+            np.array(columns.speed_mps, np.float64),
+            _traits_rows(columns.length_m, columns.traits),
         )
         if (np.diff(self.arrays.step) < 0).any():
             raise ValueError("requests must come in order of time")
@@ -61,16 +61,16 @@ class RequestFeed:
         arrays = self.arrays
         arrays.step[place], arrays.on_ramp[place] = request.step, request.on_ramp
         arrays.speed_mps[place] = request.speed_mps
-        arrays.traits[place] = _traits_rows([request])[0]
+        arrays.traits[place] = _traits_rows([request.length_m], [request.traits])[0]
         self._list.append(request)
 
 
-def _traits_rows(requests: Sequence[RequestToEnter]) -> FloatArray:
-    rows = np.full((len(requests), len(Traits._fields)), math.nan)
-    rows[:, LENGTH] = [request.length_m for request in requests]
-    for place, request in enumerate(requests):
-        if request.traits is not None:
-            rows[place] = request.traits
+def _traits_rows(length_m: Sequence[float], traits: Sequence[Traits | None]) -> FloatArray:
+    rows = np.full((len(length_m), len(Traits._fields)), math.nan)
+    rows[:, LENGTH] = length_m
+    for place, own in enumerate(traits):
+        if own is not None:
+            rows[place] = own
     return rows
 
 

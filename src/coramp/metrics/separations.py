@@ -81,8 +81,7 @@ def lane_extremes(
                 rear = order[place + 1]
                 _end_pair(extremes, lane, vehicle, rear, since_s[rear], now_s, safety)
                 since_s[rear] = now_s
-            order[place : count - 1] = order[place + 1 : count].copy()
-            count -= 1
+            count = _remove(order, count, place)
             continue
         if place < count:
             rear = order[place]
@@ -95,11 +94,26 @@ def lane_extremes(
                     _look_at_merge(
                         extremes, lane, vehicle, order[k], now_s, merge_angle_rad, safety
                     )
-        order[place + 1 : count + 1] = order[place:count].copy()
-        order[place] = vehicle
+        count = _insert(order, count, place, vehicle)
         since_s[vehicle] = now_s
-        count += 1
     return extremes
+
+
+@kernel
+def _insert(order: IntArray, count: int, place: int, vehicle: int) -> int:
+    """Puts a vehicle at its place among the first ``count``; returns how many there are then."""
+    for k in range(count, place, -1):
+        order[k] = order[k - 1]
+    order[place] = vehicle
+    return count + 1
+
+
+@kernel
+def _remove(order: IntArray, count: int, place: int) -> int:
+    """Takes who has a place out of the first ``count``; returns how many there are then."""
+    for k in range(place, count - 1):
+        order[k] = order[k + 1]
+    return count - 1
 
 
 @kernel
@@ -222,7 +236,7 @@ def closing_extremes(
     """
     ttc_s, drac_mps2 = math.inf, 0.0
     i, j = piece_under_way(front, start_s), piece_under_way(rear, start_s)
-    now_s = start_s
+    now_s, found_s = start_s, np.empty(6)
     while now_s < end_s:
         next_s = min(end_s, _end_s(front, i), _end_s(rear, j))
         front_m, front_mps, front_mps2 = state_in_piece(front, i, now_s)
@@ -230,7 +244,8 @@ def closing_extremes(
         gap_m = front_m - front_length_m - rear_m
         opening_mps = front_mps - rear_mps
         opening_mps2 = front_mps2 - rear_mps2
-        for x in _candidates(gap_m, opening_mps, opening_mps2, next_s - now_s):
+        count = _candidates(gap_m, opening_mps, opening_mps2, next_s - now_s, found_s)
+        for x in found_s[:count]:
             closing_mps = -(opening_mps + opening_mps2 * x)
             gap_then_m = gap_m + (opening_mps + 0.5 * opening_mps2 * x) * x
             if closing_mps > 0.0 and gap_then_m > 0.0:
@@ -257,15 +272,15 @@ def _end_s(pieces: FloatArray, k: int) -> float:
 
 @kernel
 def _candidates(
-    gap_m: float, opening_mps: float, opening_mps2: float, duration_s: float
-) -> FloatArray:
-    """Where TTC and DRAC can be extreme: the ends, and where their derivatives vanish.
+    gap_m: float, opening_mps: float, opening_mps2: float, duration_s: float, found_s: FloatArray
+) -> int:
+    """Writes when (s) TTC and DRAC can be extreme: the ends, and where their derivatives vanish.
 
+    Returns how many there are.
     With gap g, closing speed c and c' = -opening_mps2, d(g/c) = 0 where c^2 = -g c', and
     d(c^2/g) = 0 where c^2 = -2 g c'. Both are quadratic in x.
     """
-    found = np.empty(6)
-    found[0], found[1] = 0.0, duration_s
+    found_s[0], found_s[1] = 0.0, duration_s
     n = 2
     if opening_mps2 > 0.0:
         for factor in (1.0, 2.0):
@@ -278,6 +293,6 @@ def _candidates(
                 root = math.sqrt(discriminant)
                 for x in ((-linear - root) / (2.0 * square), (-linear + root) / (2.0 * square)):
                     if 0.0 < x < duration_s:
-                        found[n] = x
+                        found_s[n] = x
                         n += 1
-    return found[:n]
+    return n

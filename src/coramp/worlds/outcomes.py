@@ -9,6 +9,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
+from coramp.messages.events import columns_of
 from coramp.motion.lane_change import lane_change_s
 from coramp.records.outcome import Outcome, Passages, Pieces
 from coramp.scenarios.model import Scenario
@@ -86,16 +87,17 @@ def passages_of(
     plan_error_m: FloatArray,
 ) -> Passages:
     """Returns who passed when; arrays have one entry an arrival."""
+    columns = columns_of(arrivals)
     return Passages(
-        tuple(arrival.vehicle_id for arrival in arrivals),
-        np.array([arrival.on_ramp for arrival in arrivals], np.bool_),
-        np.array([arrival.length_m for arrival in arrivals]),
-        np.array([arrival.step * step_s for arrival in arrivals]),
-        np.array([arrival.speed_mps for arrival in arrivals]),
+        columns.vehicle_id,
+        np.array(columns.on_ramp, np.bool_),
+        np.array(columns.length_m, np.float64),
+        np.array(columns.step, np.float64) * step_s,
+        np.array(columns.speed_mps, np.float64),
         entry_s,
         merge_s,
         exit_s,
         plan_error_m,
-        tuple(arrival.vehicle_type for arrival in arrivals),
-        tuple(arrival.traits for arrival in arrivals),
+        columns.vehicle_type,
+        columns.traits,
     )
