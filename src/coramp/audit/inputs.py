@@ -9,10 +9,11 @@ import numpy as np
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
 from coramp.messages.commands import Command, Enter, SetSignal
-from coramp.messages.log import COMMAND, ENTRY, STREAMS, TRAIT_COLUMNS
+from coramp.messages.log import COMMAND, ENTRY, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog, read_log
 from coramp.records.run import MESSAGES, RunRecords
 from coramp.records.run_folder import read_run
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 
 

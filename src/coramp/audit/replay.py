@@ -8,8 +8,9 @@ from coramp.messages.channel import Channel
 from coramp.messages.commands import Command, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.messages.feed import RequestFeed
-from coramp.messages.log import READING, STREAMS, TRAIT_COLUMNS
+from coramp.messages.log import READING, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider
 from coramp.vehicles.traits import Traits

@@ -1,6 +1,7 @@
 """The summary of a run as the terminal shows it."""
 
 from coramp.records.schemas import Row
+from coramp.strategies.situation import RUNGS
 from coramp.studies.tables import Table, number
 
 
@@ -51,13 +52,12 @@ def run_table(summary: Row) -> Table:
         ),
     ]
     if summary["drivers"] is None:
-        rungs = ("free", "reach", "create", "delay", "hold")
         lines += [
             ("largest difference between plan and SUMO (m)", number(summary["plan_error_m"], 4)),
             ("commands that were not safe and replaced", str(summary["interventions"])),
         ]
-        if any(summary[f"rung_{rung}"] for rung in rungs):
-            by_rung = ", ".join(f"{rung} {summary[f'rung_{rung}']}" for rung in rungs)
+        if any(summary[f"rung_{rung}"] for rung in RUNGS):
+            by_rung = ", ".join(f"{rung} {summary[f'rung_{rung}']}" for rung in RUNGS)
             lines += [
                 ("ramp vehicles by rung", by_rung),
                 ("vehicles adjusted for others", str(summary["adjusted_vehicles"])),

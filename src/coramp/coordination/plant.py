@@ -3,10 +3,7 @@
 from coramp.messages.channel import Plant
 from coramp.messages.events import RequestToEnter
 
-__all__ = ["STREAMS", "Arrival", "Plant"]
-
-STREAMS = ("mainline", "ramp")
-"""Names of the streams; a stream's place is also whether it comes by the ramp."""
+__all__ = ["Arrival", "Plant"]
 
 Arrival = RequestToEnter
 """A vehicle on its way to the zone is known by the request with which it will come."""

@@ -8,7 +8,8 @@ from operator import itemgetter
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.coordination.plant import STREAMS, Arrival
+from coramp.coordination.plant import Arrival
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Mainline, Ramp, Scenario, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
 from coramp.vehicles.traits import CAR, Traits

@@ -12,6 +12,7 @@ import polars as pl
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
+from coramp.road.streams import STREAMS
 from coramp.vehicles.traits import Traits
 
 LOG_VERSION = 2
@@ -55,7 +56,6 @@ REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, E
 
 A comparison is a position that SUMO was asked for where a vehicle changes lanes or leaves.
 """
-STREAMS = ("mainline", "ramp")
 EVERY_S = 1.0
 """How often each vehicle on the road reports where it is."""
 

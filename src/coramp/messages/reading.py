@@ -23,8 +23,8 @@ from coramp.messages.log import (
     REPORT,
     REQUEST,
     SIGNAL,
-    STREAMS,
 )
+from coramp.road.streams import STREAMS
 
 ABOUT_VEHICLES = (REPORT, COMPARISON, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT)
 NEEDED = {

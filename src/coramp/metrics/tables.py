@@ -11,7 +11,6 @@ import polars as pl
 
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord
-from coramp.coordination.plant import STREAMS
 from coramp.messages.log import as_frame
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.fitting import fitted_pieces
@@ -55,6 +54,7 @@ from coramp.records.schemas import (
     Row,
     Schema,
 )
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.strategies.situation import RUNGS
 from coramp.vehicles.traits import MASS

@@ -20,6 +20,7 @@ from coramp.report.style import (
     look_of,
     new_figure,
 )
+from coramp.road.streams import STREAMS
 from coramp.studies.paper_layout import (
     LEAST_BASELINE_S,
     POPULATIONS,
@@ -31,7 +32,6 @@ from coramp.studies.paper_layout import (
 from coramp.studies.paper_results import MAINLINE_DELAY_S, RAMP_DELAY_S
 from coramp.studies.statistics import improvement_rate
 
-STREAMS = ("mainline", "ramp")
 PRINTED = {"mainline": MAINLINE_DELAY_S, "ramp": RAMP_DELAY_S}
 CELLS = [Cell(s, None) for s in STRATEGIES] + [Cell("uncontrolled", p) for p in POPULATIONS]
 LINEAR_TO_S = 0.1

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from coramp.metrics.motion import BIN_S
 from coramp.records.run import RunRecords
 from coramp.report.style import grid, legend_below, look_of, new_figure
+from coramp.road.streams import STREAMS
 from coramp.studies.speed_unit import MPS, SpeedUnit
 
-STREAMS = ("mainline", "ramp")
 MEAN_OVER_S = 60.0
 """Lines are means over so long, a tenth of a short run's horizon, but over 10 s at least."""
 SHARE, LEAST_S = 0.1, 10.0

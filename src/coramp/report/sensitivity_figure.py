@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coramp.report.style import BLACK, COLOURS, LINES, MARKERS, grid, legend_below, new_figure
+from coramp.road.streams import STREAMS
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.overrides import overrides_of
 from coramp.studies.sensitivity_layout import BREAKDOWN_DELAY_S
 from coramp.studies.statistics import Estimate, estimate
 
-STREAMS = ("mainline", "ramp")
 KEYS = {
     "safety.positioning_error_m": "positioning error L₁ (m)",
     "safety.clock_error_s": "clock error ε (s)",

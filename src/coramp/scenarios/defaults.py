@@ -5,9 +5,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeGuard
 
+from coramp.road.streams import STREAMS
 from coramp.scenarios.toml_files import read
 
-STREAMS = ("mainline", "ramp")
 LIMIT_RATIO = {"mainline": 1.0, "ramp": 1.1}
 """A limit over the stream's speed, unless its entry speeds are higher."""
 ENTRY_RATIOS = {"mainline": (0.9, 1.0), "ramp": (0.9, 1.1)}

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from coramp.errors import CorampError
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Simulation
 
-STREAMS = ("mainline", "ramp")
 FLOWS = ("flow_veh_h", "flow_to_veh_h")
 LIST = "arrivals"
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from coramp.errors import CorampError
+from coramp.road.streams import STREAMS
 
 KMH_PER_MPS = 3.6
 KEYS = {
@@ -12,7 +13,6 @@ KEYS = {
     "entry_speed_kmh": "entry_speed_mps",
 }
 """Each key in km/h with the one in m/s that it stands for."""
-STREAMS = ("mainline", "ramp")
 LIST = "arrivals"
 
 

@@ -10,10 +10,9 @@ from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
 from coramp.runs.running import broken_promises
+from coramp.strategies.situation import RUNGS
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
-
-RUNGS = ("free", "reach", "create", "delay", "hold")
 
 
 def replay_page(runs: Sequence[RunRecords]) -> str:

@@ -7,8 +7,9 @@ from statistics import NormalDist
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.coordination.plant import STREAMS, Arrival
+from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import generator
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Drivers, SpeedFactor
 
 
