@@ -14,6 +14,9 @@ from coramp.scenarios.toml_files import builtin_names, override_text
 from coramp.studies.speed_unit import KMH, MPS
 from coramp.studies.store import MARK as STUDY_MARK
 
+GENERATOR = b'<meta name="generator" content="coramp">'
+LONGEST_HEAD = 1000
+"""Within so many bytes a page says what wrote it."""
 HORIZON = "simulation.horizon_s"
 
 
@@ -34,7 +37,7 @@ def report(
     if (place / STUDY_MARK).exists():
         if against is not None:
             raise CorampError("--against: a study compares by itself; give it with a run only")
-        write_text(target, study_page(place, unit))
+        _write_page(target, study_page(place, unit))
         return target
     if not (place / MARK).exists():
         raise CorampError(
@@ -43,7 +46,7 @@ def report(
         )
     stored = [read_run(Path(name)) for name in (place, against) if name is not None]
     page = run_page(stored, stored[0].content["versions"], _repeat(stored), unit)
-    write_text(target, page)
+    _write_page(target, page)
     return target
 
 
@@ -55,8 +58,19 @@ def replay(folder: str | Path, against: str | Path | None = None) -> Path:
     """
     runs = [read_run(Path(name)) for name in (folder, against) if name is not None]
     target = Path(folder) / REPLAY
-    write_text(target, replay_page(runs))
+    _write_page(target, replay_page(runs))
     return target
+
+
+def _write_page(target: Path, page: str) -> None:
+    """Writes a page; raises CorampError where a file of that name is not one of coramp's pages."""
+    try:
+        written_by_us = not target.exists() or GENERATOR in target.read_bytes()[:LONGEST_HEAD]
+    except OSError:
+        written_by_us = False
+    if not written_by_us:
+        raise CorampError(f"{target}: was not written by coramp; move it, or give it another name")
+    write_text(target, page)
 
 
 def _scenario_file(name: str) -> str:
