@@ -126,7 +126,7 @@ def _told_twice(inputs: Inputs, rows: IntArray) -> list[Finding]:
     keys = np.column_stack([log.vehicle[rows], log.step[rows], log.numbers("of_s")[rows]])
     _, first = np.unique(keys, axis=0, return_index=True)
     return [
-        finding(log, int(rows[k]), COMMITMENT, "is told twice")
+        finding(log, int(rows[k]), COMMITMENT, "is reported twice")
         for k in np.setdiff1d(np.arange(len(rows)), first).tolist()
     ]
 
