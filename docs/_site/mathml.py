@@ -26,6 +26,9 @@ def mathml(tex: str, *, block: bool = False) -> str:
             raise ValueError(f"{part.text} is not known in {tex!r}")
         if part.text in ("/", "|") and "fence" not in part.attrib:
             part.attrib.update(stretchy="false", lspace="0", rspace="0")
+        if part.tag in ("mi", "mo") and len(part.text or "") > 1 and part.text.isalpha():
+            part.tag = "mo"  # a function, such as cos; browsers give it no space, or too much
+            part.attrib.update(lspace="0.167em", rspace="0.167em")
     root.set("alttext", tex)
     html = ET.tostring(root, encoding="unicode")
     return f'<div class="formula">{html}</div>' if block else html

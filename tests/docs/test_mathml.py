@@ -38,6 +38,7 @@ def mathml():
         (r"\le", "<mo>≤</mo>"),
         ("a<b", "<mi>a</mi><mo>&lt;</mo><mi>b</mi>"),
         (r"\text{in m/s}", "<mtext>in\xa0m/s</mtext>"),
+        (r"\cos", '<mo lspace="0.167em" rspace="0.167em">cos</mo>'),
         ("a/b", '<mi>a</mi><mo stretchy="false" lspace="0" rspace="0">/</mo><mi>b</mi>'),
     ],
 )
