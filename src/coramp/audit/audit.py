@@ -262,7 +262,7 @@ def _vehicles(inputs: Inputs, passages: Passages) -> Check:
                 who = table["vehicle_id"][k]
                 text = f"{column} of {who} is {told[k]:.6f}, by the log it is {found:.6f}"
                 findings.append(Finding(names, text))
-    how = f"{table.height} vehicles: when they came, entered and left"
+    how = f"{table.height} vehicles: scheduled, entry and exit times"
     return judged(names, how, findings)
 
 

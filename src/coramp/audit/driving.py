@@ -90,7 +90,7 @@ def check_completeness(inputs: Inputs, motion: Motion) -> Check:
         findings += _missing(inputs, reports[obeying], begun, "report on obeying")
         findings += [*_not_driven_on(inputs), *_told_twice(inputs, reports[obeying])]
         told += len(compared)
-    how = f"{told} reports: once a second of each vehicle on the road"
+    how = f"{told} reports: one per second for each vehicle on the road"
     return judged("reports are complete", how, sorted(findings, key=lambda f: f.row or 0))
 
 
