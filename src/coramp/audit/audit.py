@@ -135,7 +135,7 @@ def _of_drivers(inputs: Inputs) -> list[Check]:
     """What can be confirmed of SUMO's own drivers, and what cannot."""
     commanded = inputs.order_rows
     checks = check_positions(inputs)
-    text = "commands a driver, who takes no commands"
+    text = "commands a driver; drivers take no commands"
     findings = [finding(inputs.log, int(row), "a decision", text) for row in commanded]
     checks.append(judged("no vehicle was commanded", "no trajectory in the log", findings))
     checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))

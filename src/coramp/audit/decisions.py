@@ -48,7 +48,7 @@ def check_requests(inputs: Inputs) -> Check:
     for number, (request, due_id) in enumerate(zip(told, order, strict=False)):
         if not findings and request.vehicle_id != due_id:
             row = int(inputs.log.requests[number])
-            text = f"comes before that of {due_id}, who is to come first"
+            text = f"comes before that of {due_id}, which is due first"
             findings.append(finding(inputs.log, row, "the scenario's demand", text))
     how = f"{len(told)} requests are those that the scenario draws with its seed"
     return judged("requests to enter and their times", how, findings)
