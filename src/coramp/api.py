@@ -81,7 +81,8 @@ def run(
     afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
-    >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
+    Examples:
+        >>> coramp.run("paper", mainline_veh_h=1500, ramp_veh_h=700, seed=77)  # doctest: +SKIP
     """
     spec = make_spec(
         scenario,
@@ -241,8 +242,9 @@ def load(folder: str | Path) -> RunResult | StudyResult:
 def plan(snapshot: str, strategy: str = "mainline-priority") -> PlanResult:
     """Returns what a strategy decides on a snapshot: a built-in name or a TOML file.
 
-    >>> coramp.plan("example").decisions["rung"].item()
-    'reach'
+    Examples:
+        >>> coramp.plan("example").decisions["rung"].item()
+        'reach'
     """
     return PlanResult(plan_snapshot(load_snapshot(snapshot), strategy))
 

@@ -57,7 +57,7 @@ def test_of_drivers_it_confirms_reports_and_says_what_it_cannot(tmp_path):
     result = audit(tmp_path / "r")
     assert result.holds
     found = verdicts(result)
-    assert found["reports"] == found["nobody was commanded"] == CONFIRMED
+    assert found["reports"] == found["no vehicle was commanded"] == CONFIRMED
     assert found["min_margin_m"] == found["collisions"] == UNCHECKED
     assert "decisions" not in found
 

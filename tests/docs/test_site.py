@@ -138,3 +138,18 @@ def test_the_reference_has_signatures_and_docstrings(built):
         text = (folder / "reference" / f"{page}.html").read_text(encoding="utf-8")
         for word in words:
             assert word in text, page
+
+
+def test_examples_are_code(built):
+    folder, _ = built
+    for page in ("api", "trajectory"):
+        text = (folder / "reference" / f"{page}.html").read_text(encoding="utf-8")
+        assert "<blockquote>" not in text, page
+        assert re.search(r"<pre[^>]*>(?:(?!</pre>).)*&gt;&gt;&gt;", text, re.DOTALL), page
+
+
+def test_links_have_titles_not_file_names():
+    pages = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+    for path in [*pages, *(ROOT / "docs").rglob("*.md")]:
+        named = re.findall(r"\[[`\w./-]+\.(?:md|ipynb)`?\]\(", path.read_text(encoding="utf-8"))
+        assert named == [], path

@@ -592,7 +592,7 @@ class TestExplain:
         uncontrolled = ("-s", "uncontrolled", "--horizon", "5", "--out", "r")
         assert invoke("run", "paper", *uncontrolled).code == 0
         (line,) = refused(here, "explain", "r", "m00001")
-        assert line.startswith("Error: r: nobody was coordinated in this run; ")
+        assert line.startswith("Error: r: no vehicle was coordinated in this run; ")
 
     @pytest.mark.parametrize("content", ["{", "[]", "{}", "\x00", '{"kind": "study"}'])
     def test_a_damaged_description_is_told(self, run, content):

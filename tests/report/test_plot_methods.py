@@ -111,7 +111,7 @@ def test_an_empty_window_is_refused(run, window):
 
 
 def test_ordinary_drivers_have_no_decisions_to_draw(uncontrolled):
-    with pytest.raises(CorampError, match=r"^nobody was coordinated in this run; plot a coop"):
+    with pytest.raises(CorampError, match=r"^no vehicle was coordinated in this run; plot a coop"):
         uncontrolled.plot_decision("m00001")
 
 

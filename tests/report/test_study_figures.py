@@ -141,7 +141,7 @@ def test_rungs_are_shares_of_all_merges_on_top_of_each_other(runs):
     heights = {c.get_label()[:5]: c[1].get_height() for c in ramp.containers}
     assert heights == pytest.approx({"free:": 50.0, "creat": 50.0})
     assert ramp.get_lines()[:] == []
-    assert ramp.get_title() == "ramp priority: nobody had to wait (hold)"
+    assert ramp.get_title() == "ramp priority: no vehicle had to wait (hold)"
     assert mainline.get_ylabel() == "share of ramp vehicles (%)"
 
 

@@ -65,7 +65,7 @@ def test_a_scenario_s_own_gaps_are_named_too():
 
 def test_delays_stand_by_flow_and_the_rest_once_a_flow():
     delays, low, high = worth_tables(pl.DataFrame(RUNS))
-    assert delays.columns == ("who, gaps", "1200 + 300", "1800 + 300")
+    assert delays.columns == ("vehicles, gaps", "1200 + 300", "1800 + 300")
     cells = {row[0]: row[1:] for row in delays.rows}
     assert list(cells)[:2] == ["slots, Eq. 1", "slots, 1.0 s, 2.5 m"]
     # 1 and 2 s: the mean 1.5 and, with one degree of freedom, 12.706 * 0.5

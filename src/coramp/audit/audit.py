@@ -126,18 +126,18 @@ def _end(inputs: Inputs, left_s: FloatArray) -> Check:
 
 def _strangers(inputs: Inputs) -> Check:
     log = inputs.log
-    text = "its vehicle never asked to enter: a request before it is missing"
+    text = "the vehicle has not asked to enter before: a request is missing"
     findings = [finding(log, int(row), "a commitment", text) for row in log.strangers]
-    return judged("messages are about who asked to enter", f"{log.frame.height} rows", findings)
+    return judged("messages name known vehicles", f"{log.frame.height} rows", findings)
 
 
 def _of_drivers(inputs: Inputs) -> list[Check]:
     """What can be confirmed of SUMO's own drivers, and what cannot."""
     commanded = inputs.order_rows
     checks = check_positions(inputs)
-    text = "commands a driver, who takes no commands"
+    text = "commands a driver; drivers take no commands"
     findings = [finding(inputs.log, int(row), "a decision", text) for row in commanded]
-    checks.append(judged("nobody was commanded", "no trajectory in the log", findings))
+    checks.append(judged("no vehicle was commanded", "no trajectory in the log", findings))
     checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))
     if is_metered(strategy_named(inputs.run.content["strategy"])):
         checks.insert(0, check_signals(inputs))
@@ -183,9 +183,11 @@ def _collisions(inputs: Inputs, derived: Derived) -> Check:
         return unchecked("collisions", f"{told} by SUMO's own count; vehicles do overlap")
     findings = []
     if told or told is None:
-        findings = [Finding("run.json", f"collisions: {told!r} is told, nobody overlaps")]
+        text = f"collisions: {told!r} is recorded, but no vehicles overlap"
+        findings = [Finding("run.json", text)]
     if not told and overlap:
-        text = f"collisions: {told!r} is told, vehicles overlap by {-derived.least_gap_m:.3f} m"
+        overlap_m = -derived.least_gap_m
+        text = f"collisions: {told!r} is recorded, but vehicles overlap by {overlap_m:.3f} m"
         findings = [Finding("run.json", text)]
     how = f"{told}; the least gap in a lane is {derived.least_gap_m:.3f} m"
     return judged("collisions", how, findings)
@@ -195,7 +197,7 @@ def _figure(inputs: Inputs, name: str, found: float | None) -> Check:
     told = inputs.run.summary.get(name)
     findings = []
     if not _alike(told, found):
-        findings = [Finding("run.json", f"{name}: {told!r} is told, {found!r} was derived")]
+        findings = [Finding("run.json", f"{name}: {told!r} is recorded, {found!r} was derived")]
     how = f"{told:.6g}" if isinstance(told, int | float) else repr(told)
     return judged(name, how, findings)
 
@@ -260,7 +262,7 @@ def _vehicles(inputs: Inputs, passages: Passages) -> Check:
                 who = table["vehicle_id"][k]
                 text = f"{column} of {who} is {told[k]:.6f}, by the log it is {found:.6f}"
                 findings.append(Finding(names, text))
-    how = f"{table.height} vehicles: when they came, entered and left"
+    how = f"{table.height} vehicles: scheduled, entry and exit times"
     return judged(names, how, findings)
 
 

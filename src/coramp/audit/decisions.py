@@ -48,10 +48,10 @@ def check_requests(inputs: Inputs) -> Check:
     for number, (request, due_id) in enumerate(zip(told, order, strict=False)):
         if not findings and request.vehicle_id != due_id:
             row = int(inputs.log.requests[number])
-            text = f"comes before that of {due_id}, who is to come first"
+            text = f"comes before that of {due_id}, which is due first"
             findings.append(finding(inputs.log, row, "the scenario's demand", text))
     how = f"{len(told)} requests are those that the scenario draws with its seed"
-    return judged("who asked to enter, and when", how, findings)
+    return judged("requests to enter and their times", how, findings)
 
 
 def check_decisions(inputs: Inputs) -> tuple[Check, Replayed]:
@@ -78,7 +78,7 @@ def _differences(inputs: Inputs, due: Orders) -> list[Finding]:
     if other.any() or len(told.vehicle) != len(due.vehicle):
         place = int(np.argmax(other)) if other.any() else both
         row = inputs.order_rows[place] if place < len(told.vehicle) else log.frame.height - 1
-        text = f"a coordinator that is told the same {_instead(inputs, due, place)} instead"
+        text = f"a coordinator given the same messages {_instead(inputs, due, place)} instead"
         return [*_changed(inputs, due, place), finding(log, int(row), DECISION, text)]
     return _changed(inputs, due, both)
 
@@ -133,7 +133,7 @@ def check_signals(inputs: Inputs) -> Check:
             if k < len(wanted):
                 colour = "green" if wanted[k][1] else "red"
                 instead = f"{colour} at {wanted[k][0] * inputs.step_s:.3f} s"
-            text = f"a strategy that is told the same commands {instead} instead"
+            text = f"a strategy given the same readings commands {instead} instead"
             findings.append(finding(log, row, DECISION, text))
             break
     return judged("decisions", f"{len(due)} signals of a fresh strategy", findings)
@@ -214,7 +214,7 @@ def check_records(inputs: Inputs, again: Replayed) -> list[Check]:
     )
     summary = inputs.run.summary
     wrong = [
-        Finding("run.json", f"{name}: {summary.get(name)!r} is told, {count} were found")
+        Finding("run.json", f"{name}: {summary.get(name)!r} is recorded, {count} were found")
         for name, count in counts.items()
         if summary.get(name) != count
     ]

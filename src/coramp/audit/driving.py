@@ -90,7 +90,7 @@ def check_completeness(inputs: Inputs, motion: Motion) -> Check:
         findings += _missing(inputs, reports[obeying], begun, "report on obeying")
         findings += [*_not_driven_on(inputs), *_told_twice(inputs, reports[obeying])]
         told += len(compared)
-    how = f"{told} reports: once a second of each vehicle on the road"
+    how = f"{told} reports: one per second for each vehicle on the road"
     return judged("reports are complete", how, sorted(findings, key=lambda f: f.row or 0))
 
 
@@ -126,7 +126,7 @@ def _told_twice(inputs: Inputs, rows: IntArray) -> list[Finding]:
     keys = np.column_stack([log.vehicle[rows], log.step[rows], log.numbers("of_s")[rows]])
     _, first = np.unique(keys, axis=0, return_index=True)
     return [
-        finding(log, int(rows[k]), COMMITMENT, "is told twice")
+        finding(log, int(rows[k]), COMMITMENT, "is reported twice")
         for k in np.setdiff1d(np.arange(len(rows)), first).tolist()
     ]
 

@@ -33,7 +33,7 @@ def _options(
     _debug: Annotated[bool, typer.Option(DEBUG, help="Show tracebacks of errors.")] = False,
     _version: Annotated[
         bool,
-        typer.Option("--version", is_eager=True, callback=_told_version, help="Say the version."),
+        typer.Option("--version", is_eager=True, callback=_told_version, help="Show the version."),
     ] = False,
 ) -> None:
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""

@@ -87,7 +87,7 @@ def print_run(result: RunResult, out: Path | None, wide: bool = False) -> None:
     """Prints the summary of a run and where its records lie."""
     print_table(run_table(result.summary), wide)
     if out is not None:
-        print(f"Records are in {out}; coramp explain {out} VEHICLE tells one vehicle's story.")
+        print(f"Records are in {out}; coramp explain {out} VEHICLE explains one vehicle's plan.")
 
 
 def print_audit(result: Audit, wide: bool = False) -> None:
@@ -143,7 +143,7 @@ def _checked(margin_m: float | None) -> str:
     if margin_m is None:
         return "Nothing new to check: every commitment stays as it was."
     margin = number(margin_m, 3)
-    return f"Checked: everyone affected keeps {margin} m or more beyond the safe distance."
+    return f"Checked: every affected vehicle keeps {margin} m or more beyond the safe distance."
 
 
 def plan_json(result: PlanResult) -> Row:
@@ -256,7 +256,7 @@ def print_outlook(ahead: Outlook, wide: bool = False) -> None:
     ]
     if ahead.searches_at_most:
         rows.append(("more for breakdown searches, at most", str(ahead.searches_at_most)))
-    rows.append(("seconds for these, about", f"{ahead.expected_s:.0f} (jobs: {ahead.jobs})"))
+    rows.append(("expected duration (s)", f"{ahead.expected_s:.0f} (jobs: {ahead.jobs})"))
     print_table(Table("Outlook", ("what", "value"), tuple(rows)), wide)
 
 

@@ -20,13 +20,13 @@ def scenarios(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="Print this built-in one's TOML, to start your own from, or a file of yours with "
-            "all that is chosen for it."
+            help="A built-in file, printed as a template for your own, or your own scenario, "
+            "printed with all defaults."
         ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """List what is built in, or print one, or a file of yours."""
+    """List built-in files, or print one, or complete your own."""
     from coramp.cli.console import print_json, print_listing
     from coramp.cli.listing import listing, printed
 
@@ -42,7 +42,7 @@ def scenarios(
 
 @listing.command(epilog="Example: coramp strategies")
 def strategies(json: Json = False) -> None:
-    """List the strategies, and the packages that they come from."""
+    """List the strategies and the packages that provide them."""
     from coramp.cli.console import print_json, print_listing
     from coramp.strategies.registry import OURS, broken_plugins, origin_of
     from coramp.strategies.registry import strategies as registered
@@ -66,7 +66,7 @@ def new_strategy(
     name: Annotated[str, typer.Argument(help="The strategy's name, such as mine.")],
     out: Annotated[Path | None, typer.Option(help="Folder to write (default: ./NAME).")] = None,
 ) -> None:
-    """Write a package with a strategy of your own, and its test."""
+    """Write a package with a strategy of your own and its test."""
     from coramp.cli.skeleton import write_skeleton
 
     folder = write_skeleton(name, out or Path(name))

@@ -11,7 +11,7 @@ DEBUG = "--debug"
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 Wide = Annotated[
-    bool, typer.Option("--wide", help="Print all columns of tables, not only what 80 hold.")
+    bool, typer.Option("--wide", help="Print all columns of tables, not only those that fit.")
 ]
 StrategyName = Annotated[
     str,

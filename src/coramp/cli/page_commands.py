@@ -21,7 +21,7 @@ def explain(
         typer.Option(help="Draw the decision: road and time-space diagram (png, svg or pdf)."),
     ] = None,
 ) -> None:
-    """Tell one vehicle's story: why it got its plan, in numbers."""
+    """Explain one vehicle's plan, with the numbers behind it."""
     from coramp.cli.console import print_json, print_story, story_json
     from coramp.explain.story import story_in
     from coramp.records.run_folder import read_run
@@ -43,7 +43,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of a run or a study.")],
     against: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Another run on the same arrivals, to stand beside it."),
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, shown beside it."),
     ] = None,
     kmh: Annotated[bool, typer.Option("--kmh", help="Show speeds in km/h.")] = False,
 ) -> None:
@@ -59,10 +59,10 @@ def replay(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of coramp run --out.")],
     against: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Another run on the same arrivals, to be seen beside it."),
+        typer.Option(metavar="DIR", help="Another run on the same arrivals, shown beside it."),
     ] = None,
 ) -> None:
-    """Write DIR/replay.html: the merge from above, to be played."""
+    """Write DIR/replay.html: the merge from above, as a film."""
     from coramp.cli.console import written
     from coramp.report.writing import replay as write_replay
 
@@ -75,7 +75,7 @@ def studio(
     port: Annotated[int, typer.Option(help="Port on this machine; 0 takes any.")] = 8642,
     show: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Play with a scenario: a local page with sliders."""
+    """Explore a scenario on a local page with sliders."""
     from coramp.cli.console import serving, tell_of_compiling
     from coramp.studio.server import serve
 
@@ -88,15 +88,15 @@ def figures(
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; runs are kept in its study/.")
     ] = Path("out/figures"),
-    seeds: Annotated[int, typer.Option(help="Seeds 1 to N of what is run for them.")] = 3,
+    seeds: Annotated[int, typer.Option(help="Seeds 1 to N of the runs behind them.")] = 3,
     jobs: Annotated[int | None, typer.Option(help="Processes (default: all cores).")] = None,
     studies: Annotated[
         list[Path] | None,
         typer.Option(
             "--study",
             metavar="FOLDER",
-            help="Draw this finished study too (capacity), or in place of a run of "
-            "its own (paper, sensitivity).",
+            help="A finished study: capacity is drawn too, paper or sensitivity is drawn "
+            "instead of being run again.",
         ),
     ] = None,
     json: Json = False,

@@ -26,7 +26,7 @@ def plan(
         Path | None, typer.Option(help="Write a time-space diagram (png, svg or pdf).")
     ] = None,
 ) -> None:
-    """Plan one situation; each quantity comes with its equation."""
+    """Plan a snapshot; show each quantity with its equation."""
     from coramp.api import plan as plan_snapshot
     from coramp.cli.console import plan_json, print_json, print_plan, tell_of_compiling
 
@@ -48,14 +48,12 @@ def plan(
 def run(
     scenario: ScenarioName,
     strategy: StrategyName = "mainline-priority",
-    engine: Annotated[str, typer.Option(help="What moves the vehicles: sumo or exact.")] = "sumo",
+    engine: Annotated[str, typer.Option(help="Engine: sumo or exact.")] = "sumo",
     mainline: Annotated[float | None, typer.Option(help="Mainline flow in veh/h.")] = None,
     ramp: Annotated[float | None, typer.Option(help="Ramp flow in veh/h.")] = None,
     drivers: Annotated[
         str | None,
-        typer.Option(
-            help="Who drives uncontrolled vehicles: paper, fair or another of the scenario."
-        ),
+        typer.Option(help="Population of drivers: paper, fair or another of the scenario."),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -66,13 +64,13 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Folder for the records.")] = None,
     keep_sumo: Annotated[bool, typer.Option(help="Keep SUMO's own files in OUT/sumo.")] = False,
     keep_messages: Annotated[
-        bool, typer.Option(help="Keep what was told and commanded, for coramp audit.")
+        bool, typer.Option(help="Keep all messages and commands, for coramp audit.")
     ] = False,
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
     json: Json = False,
     wide: Wide = False,
 ) -> None:
-    """Run one scenario."""
+    """Run a scenario once."""
     from coramp.api import run as run_scenario
     from coramp.cli.console import (
         print_json,
@@ -125,18 +123,18 @@ def study(
         typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786."),
     ] = None,
     engine: Annotated[
-        str | None, typer.Option(help="What moves cooperative vehicles: sumo or exact.")
+        str | None, typer.Option(help="Engine of cooperative runs: sumo or exact.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder (default: out/NAME).")] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only say what would run, and for how long.")
+        bool, typer.Option("--dry-run", help="Only print what would run, and for how long.")
     ] = False,
-    status: Annotated[bool, typer.Option("--status", help="Only say what is done.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Run even very many runs.")] = False,
+    status: Annotated[bool, typer.Option("--status", help="Only print what is done.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Allow more than 100,000 runs.")] = False,
     json: Json = False,
     wide: Wide = False,
 ) -> None:
-    """Run a grid of runs; go on where an earlier start left off."""
+    """Run a grid of runs; resume where an earlier start stopped."""
     from coramp.api import outlook
     from coramp.api import study as run_study
     from coramp.cli.console import (
@@ -195,7 +193,7 @@ def audit(
     json: Json = False,
     wide: Wide = False,
 ) -> None:
-    """Check a run, its decisions and safety, by its messages."""
+    """Check a run's decisions and safety from its messages."""
     from coramp.audit.audit import as_data
     from coramp.audit.audit import audit as audited
     from coramp.cli.console import print_audit, print_json, tell_of_compiling

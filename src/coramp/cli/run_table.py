@@ -54,7 +54,7 @@ def run_table(summary: Row) -> Table:
     if summary["drivers"] is None:
         lines += [
             ("largest difference between plan and SUMO (m)", number(summary["plan_error_m"], 4)),
-            ("commands that were not safe and replaced", str(summary["interventions"])),
+            ("unsafe commands that were replaced", str(summary["interventions"])),
         ]
         if any(summary[f"rung_{rung}"] for rung in RUNGS):
             by_rung = ", ".join(f"{rung} {summary[f'rung_{rung}']}" for rung in RUNGS)

@@ -299,8 +299,9 @@ def build(
 
     After the last stretch it cruises. For examples, tests and notebooks; kernels use ``drive``.
 
-    >>> build(0.0, 0.0, 10.0, [(2.0, 5.0)])[-1].tolist()
-    [5.0, 75.0, 20.0, 0.0]
+    Examples:
+        >>> build(0.0, 0.0, 10.0, [(2.0, 5.0)])[-1].tolist()
+        [5.0, 75.0, 20.0, 0.0]
     """
     out = np.empty((len(stretches) + 1, 4))
     n = begin(out, time_s, station_m, speed_mps)

@@ -89,7 +89,7 @@ class RunRecords:
         found = self.vehicles.filter(vehicle_id=vehicle_id)
         if found.is_empty():
             known = sorted(self.vehicles["vehicle_id"].to_list())
-            allowed = f"allowed are {known[0]} to {known[-1]}" if known else "nobody arrived"
+            allowed = f"allowed are {known[0]} to {known[-1]}" if known else "no vehicle arrived"
             raise CorampError(f"there is no vehicle {vehicle_id!r}; {allowed}")
         return found.row(0, named=True)
 
@@ -99,7 +99,7 @@ class RunRecords:
         Raises CorampError for a run in which nobody was coordinated, or where one is lost.
         """
         if self.trajectories is None and self.decisions is None:
-            raise CorampError(f"nobody was coordinated in this run; {what} a cooperative one")
+            raise CorampError(f"no vehicle was coordinated in this run; {what} a cooperative one")
         if self.trajectories is None or self.decisions is None:
             raise CorampError("is not complete; run again with the same --out")
         return self.trajectories, self.decisions

@@ -175,7 +175,7 @@ def rung_figure(runs: pl.DataFrame) -> Figure:
             bottom += shares[rung]
         if held.any():
             axes.plot(held, color=BLACK, linestyle="none", marker="D", label="had to wait (hold)")
-        waited = "" if held.any() else ": nobody had to wait (hold)"
+        waited = "" if held.any() else ": no vehicle had to wait (hold)"
         axes.set(title=f"{look_of(strategy).label}{waited}", ylim=(0.0, 100.0))
         axes.set_ylabel("share of ramp vehicles (%)")
         _label_flows(axes, flows, upright=True)

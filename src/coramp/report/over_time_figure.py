@@ -41,7 +41,7 @@ def delays_over_time_figure(runs: Sequence[RunRecords]) -> Figure:
         here = run.vehicles.filter(stream=stream).with_columns(count=pl.lit(1))
         return binned(here, ("scheduled_s", "delay_s", "count"), _step_s(run))
 
-    return _figure(runs, delays, "mean delay of who was due then (s)")
+    return _figure(runs, delays, "mean delay by scheduled time (s)")
 
 
 def binned(frame: pl.DataFrame, columns: tuple[str, str, str], step_s: float) -> Line:

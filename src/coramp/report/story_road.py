@@ -153,8 +153,8 @@ def _draw_gap(axes: Axes, scene: Scene) -> None:
     ends = [decision[key] is not None for key in ("front_vehicle_id", "rear_vehicle_id")]
     where = {
         (True, True): f"gap between X and Y, {size_m:.2f} m",
-        (True, False): "gap behind X, with nobody after it",
-        (False, True): "gap ahead of Y, with nobody before it",
+        (True, False): "gap behind X, with no vehicle after it",
+        (False, True): "gap ahead of Y, with no vehicle before it",
     }.get((ends[0], ends[1]), "empty mainline")
     axes.add_patch(
         Rectangle(

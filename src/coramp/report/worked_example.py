@@ -171,7 +171,7 @@ def positions_m(trajectories: pl.DataFrame, time_s: float) -> Positions:
 
 def _told(planned: PlannedSnapshot, rung: str) -> str:
     moved = ", ".join(sorted(moved_vehicles(planned)))
-    return f"rung {rung}" + (f", {moved} moved ahead" if moved else ", nobody else moves")
+    return f"rung {rung}" + (f", {moved} moved ahead" if moved else ", no other vehicle moves")
 
 
 def _draw_positions(

@@ -64,8 +64,8 @@ def _beside_a_list(given: list[str], label: str, origins: Mapping[str, str]) -> 
     for key in given:
         by_origin.setdefault(origins.get(key, label), []).append(key)
     return [
-        f"{f'{origin}: ' if origin else ''}{', '.join(keys)}: beside [[arrivals]], whose list says "
-        "already who comes; allowed is a list or flows, never both"
+        f"{f'{origin}: ' if origin else ''}{', '.join(keys)}: beside [[arrivals]], which already "
+        "lists every vehicle; allowed is a list or flows, never both"
         for origin, keys in by_origin.items()
     ]
 

@@ -43,16 +43,18 @@ class Alinea:
     metered: ClassVar[bool] = True
 
     target_occupancy_percent: float = parameter(
-        20.0, 1.0, 80.0, meaning="o_target, at the loop beside the acceleration lane"
+        20.0, 1.0, 80.0, meaning="o_target, at the detector beside the acceleration lane"
     )
-    gain_veh_h: float = parameter(70.0, 1.0, 1000.0, meaning="K, per % of occupancy")
+    gain_veh_h: float = parameter(70.0, 1.0, 1000.0, meaning="K, gain per % of occupancy")
     update_s: float = parameter(30.0, 5.0, 300.0, meaning="time between two updates of the rate")
     least_veh_h: float = parameter(240.0, 60.0, 3600.0, meaning="lowest rate")
-    most_veh_h: float = parameter(1200.0, 60.0, 3600.0, meaning="highest rate, then always green")
-    queue_occupancy_percent: float = parameter(
-        50.0, 1.0, 100.0, meaning="of the loop at the ramp's start; above it the ramp is let go"
+    most_veh_h: float = parameter(
+        1200.0, 60.0, 3600.0, meaning="highest rate; at it the signal stays green"
     )
-    period_s: float = parameter(1.0, 0.1, 2.0, meaning="clock of the signal")
+    queue_occupancy_percent: float = parameter(
+        50.0, 1.0, 100.0, meaning="at the ramp's start; above it the queue is let go"
+    )
+    period_s: float = parameter(1.0, 0.1, 2.0, meaning="control period of the signal")
 
     def problems(self) -> list[str]:
         """Returns what does not fit together: a range of rates that is none."""

@@ -34,9 +34,9 @@ class DpSequence:
     summary: ClassVar[str] = "the order of merging with the least delay, by dynamic programming"
     cooperative: ClassVar[bool] = True
 
-    same_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h within a stream")
-    cross_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h between the streams")
-    last_weight: float = parameter(1.0, 0.0, 100.0, meaning="w, of the last crossing")
+    same_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="smallest headway h within a stream")
+    cross_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="smallest headway h between streams")
+    last_weight: float = parameter(1.0, 0.0, 100.0, meaning="w, weight of the last crossing")
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision for the first subject, in its place of the best order."""

@@ -28,9 +28,9 @@ class FifoOptimalControl:
     cooperative: ClassVar[bool] = True
 
     merge_station_m: float = parameter(
-        120.0, 10.0, 5000.0, meaning="where ramp vehicles merge, at most the last station for it"
+        120.0, 10.0, 5000.0, meaning="where ramp vehicles merge, at most the last merge station"
     )
-    hold_s: float = parameter(0.5, 0.1, 5.0, meaning="how long an acceleration is held")
+    hold_s: float = parameter(0.5, 0.1, 5.0, meaning="time for which an acceleration is held")
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision for the first subject, behind everyone who would be before it."""

@@ -33,9 +33,9 @@ class Game:
     summary: ClassVar[str] = "ramp and lane vehicle play yield or go, pair by pair"
     cooperative: ClassVar[bool] = True
 
-    time_weight: float = parameter(1.0, 0.0, 100.0, meaning="w_t, per s of delay")
-    effort_weight: float = parameter(0.05, 0.0, 100.0, meaning="w_f, per m2/s3 of effort")
-    risk_weight: float = parameter(10.0, 0.001, 1000.0, meaning="w_s, of a conflict")
+    time_weight: float = parameter(1.0, 0.0, 100.0, meaning="w_t, weight of 1 s of delay")
+    effort_weight: float = parameter(0.05, 0.0, 100.0, meaning="w_f, weight of 1 m2/s3 of effort")
+    risk_weight: float = parameter(10.0, 0.001, 1000.0, meaning="w_s, weight of a conflict")
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision for the first subject, where its games put it."""

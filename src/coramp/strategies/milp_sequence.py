@@ -37,10 +37,12 @@ class MilpSequence:
     summary: ClassVar[str] = "the order of merging by a mixed-integer program, rolling horizon"
     cooperative: ClassVar[bool] = True
 
-    same_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h within a stream")
-    cross_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="least h between the streams")
-    horizon_s: float = parameter(4.0, 0.5, 20.0, meaning="how far around the subject is ordered")
-    ramp_vehicles: int = parameter(4, 1, 12, meaning="most ramp vehicles that are ordered at once")
+    same_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="smallest headway h within a stream")
+    cross_stream_s: float = parameter(0.0, 0.0, 10.0, meaning="smallest headway h between streams")
+    horizon_s: float = parameter(
+        4.0, 0.5, 20.0, meaning="time around the subject that is put in order"
+    )
+    ramp_vehicles: int = parameter(4, 1, 12, meaning="most ramp vehicles in one problem")
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the decision for the first subject, in its place of the best order."""

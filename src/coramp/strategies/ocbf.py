@@ -70,15 +70,15 @@ class Ocbf:
     summary: ClassVar[str] = "optimal control tracked under control barrier functions, by QP"
     cooperative: ClassVar[bool] = True
 
-    time_weight: float = parameter(0.25, 0.0, 0.95, meaning="alpha, of travel time against effort")
-    headway_s: float = parameter(0.5, 0.05, 5.0, meaning="phi, of the barriers")
-    standstill_gap_m: float = parameter(0.5, 0.0, 20.0, meaning="d, of the barriers")
-    barrier_rate_ps: float = parameter(1.0, 0.05, 2.0, meaning="kappa, how fast b may fall")
-    speed_rate_ps: float = parameter(1.0, 0.05, 10.0, meaning="c, of the Lyapunov condition")
-    relaxation_weight: float = parameter(0.01, 1e-6, 1e6, meaning="p, of the Lyapunov condition")
-    period_s: float = parameter(
-        0.5, 0.1, 1.0, meaning="control period; kappa times it is at most 1"
+    time_weight: float = parameter(0.25, 0.0, 0.95, meaning="alpha, weight of travel time")
+    headway_s: float = parameter(0.5, 0.05, 5.0, meaning="phi, headway in the barriers")
+    standstill_gap_m: float = parameter(
+        0.5, 0.0, 20.0, meaning="d, gap at standstill in the barriers"
     )
+    barrier_rate_ps: float = parameter(1.0, 0.05, 2.0, meaning="kappa, rate at which b may fall")
+    speed_rate_ps: float = parameter(1.0, 0.05, 10.0, meaning="c, rate of the Lyapunov condition")
+    relaxation_weight: float = parameter(0.01, 1e-6, 1e6, meaning="p, weight of its relaxation")
+    period_s: float = parameter(0.5, 0.1, 1.0, meaning="control period, at most 1 / kappa")
 
     def problems(self) -> list[str]:
         """Returns what does not fit together: the proof of ``barriers`` needs it."""

@@ -63,19 +63,21 @@ class Slots:
     )
 
     order: str = choice(
-        "first-come", "mainline-first", "ramp-first", "least-delay", meaning="who gets a slot first"
+        "first-come", "mainline-first", "ramp-first", "least-delay", meaning="order of slots"
     )
     ramp_share: float = parameter(
-        0.5, 0.0, 1.0, meaning="the ramp's claim beyond the limit: 0 mainline first, 1 ramp first"
+        0.5, 0.0, 1.0, meaning="the ramp's priority in queues: 0 mainline first, 1 ramp first"
     )
     longest_wait_s: float = parameter(
-        300.0, 1.0, 3600.0, meaning="after so long a wait, first come, first served"
+        300.0, 1.0, 3600.0, meaning="waits beyond this are served first come, first served"
     )
     clear_entrance: bool = parameter(
-        True, meaning="mainline vehicles speed up as hard as is comfortable as they enter"
+        True, meaning="mainline vehicles accelerate at the comfort limit on entry"
     )
-    smooth: bool = parameter(False, meaning="lags are driven with the least effort, where possible")
-    jerk_mps3: float = parameter(0.5, 0.05, 10.0, meaning="largest jerk of a smooth way, over 1 s")
+    smooth: bool = parameter(False, meaning="lost time is driven with least effort, if possible")
+    jerk_mps3: float = parameter(
+        0.5, 0.05, 10.0, meaning="largest jerk of a smooth trajectory, over 1 s"
+    )
 
     def problems(self) -> list[str]:
         """Returns what does not fit together, a line each."""

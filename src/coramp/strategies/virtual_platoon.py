@@ -38,10 +38,12 @@ class VirtualPlatoon:
     summary: ClassVar[str] = "vehicle mapping: one virtual platoon with a constant time gap"
     cooperative: ClassVar[bool] = True
 
-    time_gap_s: float = parameter(0.6, 0.0, 5.0, meaning="t_c, kept to the predecessor")
-    standstill_gap_m: float = parameter(1.0, 0.0, 20.0, meaning="s_0, kept at a stand")
-    gap_gain_ps2: float = parameter(0.25, 0.01, 10.0, meaning="k_p, of the error in distance")
-    speed_gain_ps: float = parameter(0.8, 0.01, 10.0, meaning="k_v, of the difference in speed")
+    time_gap_s: float = parameter(0.6, 0.0, 5.0, meaning="t_c, time gap to the predecessor")
+    standstill_gap_m: float = parameter(1.0, 0.0, 20.0, meaning="s_0, gap at standstill")
+    gap_gain_ps2: float = parameter(0.25, 0.01, 10.0, meaning="k_p, gain on the error in distance")
+    speed_gain_ps: float = parameter(
+        0.8, 0.01, 10.0, meaning="k_v, gain on the difference in speed"
+    )
     period_s: float = parameter(0.5, 0.1, 2.0, meaning="control period")
 
     def decide(self, view: View, memory: Memory) -> Decision:

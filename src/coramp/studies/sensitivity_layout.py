@@ -39,7 +39,7 @@ def _table(strategy: str, group: pl.DataFrame) -> Table:
     legend = "Mean delay of mainline / ramp in s, with 95 % intervals over seeds; u: unserved."
     meaning = (
         "The flow that still merges is the largest here (mainline and ramp together) at which "
-        f"neither stream loses more than {BREAKDOWN_DELAY_S:g} s on average and nobody is left."
+        f"neither stream loses more than {BREAKDOWN_DELAY_S:g} s on average and no vehicle is left."
     )
     return Table(f"Sensitivity: {strategy}", columns, tuple(rows), (legend, meaning))
 

@@ -12,7 +12,7 @@ from coramp.studies.tables import Table, number, with_interval
 GAPS = ("safety.time_gap_s", "safety.standstill_gap_m")
 DELAYS_NOTE = (
     "Mean delay of all vehicles in s, waiting outside included, with 95 % intervals over seeds. In "
-    "brackets how many were not out at the end (u) and how many pairs collided in SUMO (c)."
+    "brackets: vehicles that had not left at the end (u), pairs that collided in SUMO (c)."
 )
 FLOW_NOTE = (
     "Delays and fuel are means over seeds, the rest are sums over seeds but for the smallest TTC. "
@@ -36,14 +36,14 @@ def worth_tables(good: pl.DataFrame) -> list[Table]:
         for _, name in names
         for flow in flows
     }
-    columns = ("who, gaps", *(f"{m:g} + {r:g}" for m, r in flows))
+    columns = ("vehicles, gaps", *(f"{m:g} + {r:g}" for m, r in flows))
     delays = tuple((name, *(_delay(found[name, flow]) for flow in flows)) for _, name in names)
     tables = [Table("Mean delay of all vehicles (s)", columns, delays, (DELAYS_NOTE,))]
     for flow in flows:
         there = [(name, found[name, flow]) for _, name in names if found[name, flow]]
         body = tuple((name, *_figures(runs)) for name, runs in there)
         title = f"At {flow[0]:g} + {flow[1]:g} veh/h"
-        tables.append(Table(title, ("who, gaps", *FIGURES), body, (FLOW_NOTE,)))
+        tables.append(Table(title, ("vehicles, gaps", *FIGURES), body, (FLOW_NOTE,)))
     return tables
 
 
@@ -60,7 +60,7 @@ FIGURES = (
 
 
 def name_of(run: dict[str, Any]) -> str:
-    """Returns who drove and at which gaps, in words."""
+    """Returns the strategy or drivers and their gaps, in words."""
     gaps = gaps_in_words(overrides_of(run))
     if run["drivers"] is None:
         kept = gaps_in_words({key: setting_of(run, key) for key in GAPS})

@@ -134,7 +134,7 @@ def answer(run: RunRecords) -> str:
     """Returns in a sentence what the run says."""
     row = run.summary
     left = row["unserved"]
-    served = "everyone got through" if not left else f"{left} vehicles did not get through"
+    served = "every vehicle got through" if not left else f"{left} vehicles did not get through"
     return (
         f"With {title_of(run)}, at {run.flows}, vehicles lose {number(row['mainline_delay_s'])} s "
         f"on the mainline and {number(row['ramp_delay_s'])} s on the ramp on average, and {served}."

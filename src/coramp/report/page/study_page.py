@@ -47,7 +47,7 @@ DRAWN = {
     "sensitivity": (("Delay by setting", sensitivity_figure),),
     "capacity": (("Where each strategy breaks down", capacity_figure),),
     "field": (
-        ("Delay against fuel, and who is on the front", front_figure),
+        ("Delay against fuel, with the Pareto front", front_figure),
         ("Every strategy on the same arrivals", field_figure),
     ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
