@@ -19,6 +19,11 @@ from coramp.kinematics.trajectory import (
     time_at_station,
 )
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import (
+    NOT_PLANNED_S,
+    has_place_on_mainline,
+    merge_time_at_entry_s,
+)
 from coramp.vehicles.traits import LENGTH, Traits
 
 ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
@@ -61,7 +66,7 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.zeros(rows, np.int64),
         np.zeros(rows, np.int64),
         np.zeros(rows),
-        np.full(rows, math.inf),
+        np.full(rows, NOT_PLANNED_S),
         np.tile(np.array([-math.inf, math.inf]), (rows, 1)),
         np.zeros((rows, len(Traits._fields))),
         np.full(rows, math.inf),
@@ -191,7 +196,7 @@ def add_row(book: Book, traits: FloatArray, on_ramp: bool) -> int:
     row = book.used[ROWS]
     book.length_m[row] = traits[LENGTH]
     book.traits[row] = traits
-    book.merge_time_s[row] = math.inf if on_ramp else -math.inf
+    book.merge_time_s[row] = merge_time_at_entry_s(on_ramp)
     book.used[ROWS] += 1
     return int(row)
 
@@ -220,7 +225,7 @@ def write_commitment(
     way = book.pieces[start : first + count]
     book.merge_time_s[row] = merge_time_s
     book.exit_s[row] = time_at_station(way, zone_end_m)
-    if merge_time_s < math.inf:
+    if has_place_on_mainline(merge_time_s):
         from_s = max(now_s, merge_time_s)
         lowest_m, highest_m = intercept_range_m(way, from_s, cruise_speed_mps)
         book.intercepts_m[row, 0], book.intercepts_m[row, 1] = lowest_m, highest_m

@@ -64,6 +64,7 @@ from coramp.strategies.base import (
     steps_of_period,
 )
 from coramp.vehicles.fleet import proposed
+from coramp.vehicles.merge_state import has_place_on_mainline
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +238,7 @@ class Coordinator:
 
     def _moves_up_in_time(self, row: int, step: int, before_step: int) -> None:
         """Moves a vehicle up whose stop would begin before a step, if it can."""
-        if self.ledger.merge_time_s(row) < math.inf:
+        if has_place_on_mainline(self.ledger.merge_time_s(row)):
             return
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
@@ -268,7 +269,9 @@ class Coordinator:
         now_s = step * self._step_s
         self.ledger.commit(row, pieces, merge_time_s, now_s)
         self._examiner.note(row, pieces, merge_time_s, now_s)
-        if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
+        if has_place_on_mainline(
+            merge_time_s
+        ):  # it is planned: nothing is due at its decision station
             self._wakes.planned(row)
         self._announce(row, step)
 
@@ -287,7 +290,7 @@ class Coordinator:
     def _moves_up(self, row: int, step: int) -> bool:
         """Whether a vehicle without a merge can go on to a stop further ahead, and now does."""
         time_s = step * self._step_s
-        if self.ledger.merge_time_s(row) < math.inf:
+        if has_place_on_mainline(self.ledger.merge_time_s(row)):
             return False
         from_s = time_s + self._rules.control.actuation_delay_s
         proposal = plan_moving_up(self.ledger.fleet, from_s, self._rules)

@@ -81,7 +81,7 @@ class Ledger:
         return float(self.book.exit_s[row])
 
     def merge_time_s(self, row: int) -> float:
-        """Returns the committed merge time (s): infinity for none, -infinity on the mainline."""
+        """Returns the committed merge time (s), as ``vehicles.merge_state`` reads it."""
         return float(self.book.merge_time_s[row])
 
     def length_m(self, row: int) -> float:

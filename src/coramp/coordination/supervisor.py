@@ -6,7 +6,6 @@ stops before the nose. What it lets pass is committed. What it refuses is not dr
 keeps its last commitment, which is safe to its end.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,6 +29,7 @@ from coramp.strategies.base import DriveWithAcceleration
 from coramp.strategies.ramp_queue import next_ahead_on_ramp
 from coramp.strategies.situation import foremost_unknown_m
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import NOT_PLANNED_S, is_on_mainline, is_waiting
 
 MOST_PASSES = 3
 """A command that another one stands in the way of is tried again after that."""
@@ -111,20 +111,20 @@ def _drive_one(
     fleet = fleet_of(book)
     out = np.empty((MAX_PIECES, 4))
     merge_s = fleet.merge_time_s[row]
-    if merge_s <= from_s:
+    if is_on_mainline(merge_s, from_s):
         n = hold_then_cruise(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         return _commit_if_safe(book, record, row, out[:n], merge_s, now_s, rules, bounds)
-    if merge or merge_s < math.inf:
+    if merge or not is_waiting(merge_s):
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
             change_s = lane_change_s(out[n - 1, TIME], rules.control.step_s)
             if _commit_if_safe(book, record, row, out[:n], change_s, now_s, rules, bounds):
                 return True
-    if merge_s < math.inf:
+    if not is_waiting(merge_s):
         return False
     stop_m = _place_to_stop_m(fleet, row, from_s, rules)
     n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
-    return _commit_if_safe(book, record, row, out[:n], math.inf, now_s, rules, bounds)
+    return _commit_if_safe(book, record, row, out[:n], NOT_PLANNED_S, now_s, rules, bounds)
 
 
 @kernel

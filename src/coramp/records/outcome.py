@@ -17,10 +17,11 @@ LANES = ("ramp", "acceleration", "mainline")
 class Passages:
     """One entry a vehicle, in the order of scheduled times; nan where something never happened.
 
-    ``merge_s`` is when a ramp vehicle changed to the mainline, minus infinity for mainline
-    vehicles. ``entry_speed_mps`` is the scheduled one. ``plan_error_m`` is the largest distance
-    seen between plan and simulator, nan without a plan. ``traits`` are None for vehicles that only
-    the common limits bind; types and traits may be left out where that is so for all.
+    ``merge_s`` is when a ramp vehicle changed to the mainline, ``BY_MAINLINE_S`` of
+    ``vehicles.merge_state`` for mainline vehicles. ``entry_speed_mps`` is the scheduled one.
+    ``plan_error_m`` is the largest distance seen between plan and simulator, nan without a plan.
+    ``traits`` are None for vehicles that only the common limits bind; types and traits may be left
+    out where that is so for all.
     """
 
     vehicle_id: tuple[str, ...]

@@ -34,6 +34,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     proposed,
 )
+from coramp.vehicles.merge_state import has_place_on_mainline
 from coramp.vehicles.trace import (
     BEFORE_THE_NOSE,
     CANNOT_FALL_BACK,
@@ -83,7 +84,7 @@ def rows_on_mainline(fleet: Fleet, subject: int, at_s: float) -> IntArray:
     rows, behind_m = np.empty(len(fleet.live), np.int64), np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if row != subject and fleet.merge_time_s[row] < math.inf:
+        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]):
             station_m, _ = station_and_speed(committed(fleet, row), at_s)
             rows[n], behind_m[n] = row, -station_m
             n += 1

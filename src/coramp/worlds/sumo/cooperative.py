@@ -13,6 +13,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import TIME, station_and_speed, time_at_station
 from coramp.road.rules import Rules
+from coramp.vehicles.merge_state import is_planned
 from coramp.worlds.sumo.commands import ON_GRID, command_table, correction
 from coramp.worlds.sumo.demand import cooperative_type
 from coramp.worlds.sumo.session import Session
@@ -123,7 +124,7 @@ class CooperativePlant:
         following = vehicle.following = Following(row, pieces, commands, last)
         if commands:
             self._push(first, SPEED, following)
-        if math.isfinite(merge_time_s):
+        if is_planned(merge_time_s):
             change = math.ceil(merge_time_s / self._step_s - ON_GRID) - 1
             if change >= first:
                 self._push(change, MERGE, following)

@@ -25,6 +25,7 @@ from coramp.records.outcome import Outcome, Pieces
 from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
+from coramp.vehicles.merge_state import BY_MAINLINE_S
 from coramp.worlds.outcomes import (
     cap_step_of,
     cooperative_outcome,
@@ -257,7 +258,7 @@ def _passing_times(
     entry_s[seen] = samples.time_s[first]
     merged, at = np.unique(samples.vehicle[samples.on_mainline], return_index=True)
     merge_s[merged] = samples.time_s[samples.on_mainline][at]
-    merge_s[[not arrival.on_ramp for arrival in arrivals]] = -math.inf
+    merge_s[[not arrival.on_ramp for arrival in arrivals]] = BY_MAINLINE_S
     left_m = end_m - samples.station_m[last]
     run_on_s = np.minimum(left_m / np.maximum(samples.speed_mps[last], 1e-9), step_s)
     exit_s[seen] = samples.time_s[last] + run_on_s
