@@ -12,6 +12,7 @@ from coramp.audit.decisions import (
     check_records,
     check_requests,
     check_signals,
+    steps_between_looks,
 )
 from coramp.audit.driving import (
     PLAN_ERROR_M,
@@ -134,12 +135,13 @@ def _strangers(inputs: Inputs) -> Check:
 def _of_drivers(inputs: Inputs) -> list[Check]:
     """What can be confirmed of SUMO's own drivers, and what cannot."""
     commanded = inputs.order_rows
-    checks = check_positions(inputs)
+    strategy = strategy_named(inputs.run.content["strategy"])
+    checks = check_positions(inputs, steps_between_looks(inputs))
     text = "commands a driver, who takes no commands"
     findings = [finding(inputs.log, int(row), "a decision", text) for row in commanded]
     checks.append(judged("nobody was commanded", "no trajectory in the log", findings))
     checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))
-    if is_metered(strategy_named(inputs.run.content["strategy"])):
+    if is_metered(strategy):
         checks.insert(0, check_signals(inputs))
     return [*checks, *(unchecked(name, TOO_SELDOM) for name in FIGURES)]
 

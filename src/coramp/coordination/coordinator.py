@@ -5,7 +5,7 @@ Driven by the control clock alone. It knows no simulator: a plant carries the ve
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
@@ -14,6 +14,7 @@ from coramp.checker.reasons import (
     ACCEPTED,
     HOLDS_NEWCOMERS,
     REASONS,
+    TAKES_NO_COMMANDS,
     TOO_NEAR,
     TOO_NEAR_AT_MERGE,
 )
@@ -23,6 +24,7 @@ from coramp.coordination.admission import (
     undecided_in_lane_order,
 )
 from coramp.coordination.book import ways_of
+from coramp.coordination.drivers import DriverRoad, sorted_by_taker
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
     DONE,
@@ -47,6 +49,7 @@ from coramp.coordination.plant import Plant
 from coramp.coordination.supervisor import drive_safely
 from coramp.coordination.wakes import PERIOD, Wakes
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.events import DetectorReading
 from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
 from coramp.road.rules import Rules, packed
@@ -54,12 +57,14 @@ from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
     Decider,
     Decision,
+    Detectors,
     DriveWithAcceleration,
     Explanation,
     FollowTrajectory,
     Memory,
     View,
     entry_policy_of,
+    is_metered,
     period_of,
     steps_of_period,
 )
@@ -98,8 +103,9 @@ class Coordinator:
     """Runs one strategy over the requests to enter that a world feeds.
 
     The feed is the world's; a request is read when its step has come, and may be there earlier.
-    Without a plant nobody carries the vehicles: the commitments are all there is.
-    ``interventions`` counts what the strategy commanded and the checker refused.
+    Without a plant nobody carries the vehicles: the commitments are all there is. ``drivers`` is
+    what it hears of vehicles that take no commands, if there are any.
+    ``interventions`` counts what the strategy commanded and was refused.
     """
 
     def __init__(
@@ -109,6 +115,7 @@ class Coordinator:
         feed: RequestFeed,
         fastest_entry_mps: float,
         plant: Plant | None = None,
+        drivers: DriverRoad | None = None,
     ) -> None:
         road = rules.road
         self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(feed))
@@ -128,6 +135,8 @@ class Coordinator:
         self._fastest_entry_mps = fastest_entry_mps
         self._newcomers = Newcomers(fastest_entry_mps, rules)
         self._plant = plant
+        self._drivers = DriverRoad() if drivers is None else drivers
+        self._detectors: Detectors | None = None
         self._memory: Memory = None
         self._step_s = rules.control.step_s
         self._wakes = Wakes()
@@ -136,9 +145,12 @@ class Coordinator:
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
     def expect_arrivals(self) -> None:
-        """Lets every request be heard at its step, and starts the strategy's own clock, if any."""
+        """Lets every request be heard at its step, and starts the strategy's own clock, if any.
+
+        The clock of a strategy that meters are the readings of the loops.
+        """
         open_gate(self._gate)
-        if self._period_steps:
+        if self._period_steps and not is_metered(self._strategy):
             self._wakes.ask(self._period_steps, PERIOD)
 
     def run(self, last_step: int) -> None:
@@ -153,6 +165,15 @@ class Coordinator:
             if self._plant is not None:
                 self._plant.advance(step)
             self._handle_wakes(step)
+
+    def read(self, reading: DetectorReading) -> None:
+        """Asks the strategy at the step of a reading of the road's loops, after all else of it."""
+        step = round(reading.time_s / self._step_s)
+        self.run(step)
+        _, *told = astuple(reading)
+        self._detectors = Detectors(*told)
+        self._decide((), step)
+        self._detectors = None
 
     def _admit(self, last_step: int) -> None:
         """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
@@ -218,12 +239,15 @@ class Coordinator:
         return sorted(set(range(int(self._gate.feed[HEARD]))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
-        if self._wakes.tick(step, self._period_steps) and len(self.ledger.fleet.live):
+        if self._wakes.tick(step, self._period_steps) and self._has_traffic():
             self._decide((), step)
         while subjects := self._wakes.woken(step):
             ready = self._ready(subjects, step)
             if ready:
                 self._decide(ready, step)
+
+    def _has_traffic(self) -> bool:
+        return bool(len(self.ledger.fleet.live) or len(self._drivers.seen().rows))
 
     def _ready(self, subjects: tuple[int, ...], step: int) -> tuple[int, ...]:
         """Who is to be planned now: all, but for those who can go on to their station first.
@@ -324,9 +348,10 @@ class Coordinator:
             self._fastest_entry_mps,
             self._rules,
             self._packed,
-            None,
+            self._detectors,
             partial(entries_of, self._gate, entered, self._step_s),
             partial(waiting_at, self._gate, step, self._step_s),
+            self._drivers.seen,
         )
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
@@ -336,24 +361,21 @@ class Coordinator:
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
         """Commits what a decision commands, or what is safe instead, and notes its wakes."""
         time_s = step * self._step_s
-        drives = [c for c in decision.commands if isinstance(c, DriveWithAcceleration)]
-        if drives:
-            self.drive(drives, step)
-        trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]
+        given = sorted_by_taker(decision.commands)
+        without_signal = sum(not self._drivers.show(signal, step) for signal in given.signals)
+        self.interventions += given.refused + without_signal
+        if given.drives:
+            self.drive(given.drives, step)
+        trajectories = given.trajectories
         margin_m = math.nan
         if trajectories:
-            earliest_s = time_s + self._rules.control.actuation_delay_s
-            verdict = self._examiner.change(trajectories, time_s, earliest_s)
-            code = verdict.code
-            if (
-                code == ACCEPTED
-                and not (self._holds_newcomers or self._rules.traffic.differs)
-                and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
-            ):
-                code = HOLDS_NEWCOMERS
-            if code != ACCEPTED:
+            if given.to_drivers:
+                verdict = Verdict(TAKES_NO_COMMANDS, -1, -1, math.nan)
+            else:
+                verdict = self._verdict_on(trajectories, time_s)
+            if verdict.code != ACCEPTED:
                 self.interventions += 1
-                self._refuse(decision, subjects, step, verdict._replace(code=code))
+                self._refuse(decision, subjects, step, verdict)
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:
@@ -368,6 +390,17 @@ class Coordinator:
                 self._moves_up_in_time(row, step, wake_step)
             elif wake_step > step:
                 self._moves_up(row, step)
+
+    def _verdict_on(self, trajectories: Sequence[FollowTrajectory], time_s: float) -> Verdict:
+        earliest_s = time_s + self._rules.control.actuation_delay_s
+        verdict = self._examiner.change(trajectories, time_s, earliest_s)
+        if (
+            verdict.code == ACCEPTED
+            and not (self._holds_newcomers or self._rules.traffic.differs)
+            and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
+        ):
+            return verdict._replace(code=HOLDS_NEWCOMERS)
+        return verdict
 
     def drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> int:
         """Carries out what is safe of commanded accelerations; returns how many were refused."""

@@ -15,9 +15,11 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
+from coramp.coordination.service import Service
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
+from coramp.messages.events import Report
 from coramp.messages.feed import RequestFeed
 from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
@@ -44,7 +46,7 @@ from coramp.worlds.sumo.network import (
     road_plan,
 )
 from coramp.worlds.sumo.session import Session
-from coramp.worlds.sumo.telling import positions_in_sumo
+from coramp.worlds.sumo.telling import DriversInSumo, positions_in_sumo, with_answers
 from coramp.worlds.sumo.traits import traits_of
 from coramp.worlds.telling import reports_of_samples, together
 
@@ -177,7 +179,10 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
 def run_uncontrolled(
     scenario: Scenario, strategy: Decider, drivers: Drivers, seed: int, options: SumoOptions
 ) -> Outcome:
-    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not."""
+    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not.
+
+    They report and are never commanded; the loop is that of cooperative runs.
+    """
     arrivals = arrivals_of(scenario, seed)
     metered = is_metered(strategy)
     plan = driver_road_plan(scenario, drivers, metered)
@@ -187,19 +192,16 @@ def run_uncontrolled(
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         traits = traits_of(drivers, arrivals, seed)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered))
-        look_steps = round(LOOK_S / step_s)
+        look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
-            look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
             files.write_loops(loops(scenario, look_steps * step_s))
         with Session(files.options(), step_s, options.gui) as session:
-            meter = Meter(session, scenario, strategy) if metered else None
-            step = 0
-            while step < cap_step and (step == 0 or session.vehicles_left()):
-                until = min(cap_step, step + look_steps)
-                if meter is not None:
-                    meter.run(step, until)
-                session.step_to(until)
-                step = until
+            road = DriversInSumo(session, plan.lane_starts_m(), step_s)
+            meter = Meter(session, step_s) if metered else None
+            service = Service(
+                strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
+            )
+            _let_drive(session, service, road, meter, look_steps, cap_step)
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions = files.collisions()
@@ -215,7 +217,7 @@ def run_uncontrolled(
     if options.keep_messages:
         last_s = float(np.max(exit_s, initial=0.0)) if left else math.inf
         end_step = min(cap_step, step_after(last_s, step_s))
-        told = _told_of_drivers(arrivals, samples, meter, step_s, end_step)
+        told = _told_of_drivers(arrivals, samples, road.told, meter, step_s, end_step)
     return Outcome(
         cooperative=False,
         passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
@@ -224,19 +226,44 @@ def run_uncontrolled(
         driven=Pieces(first, rows),
         end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
         collisions=collisions,
+        refusals=tuple(service.coordinator.refusals),
+        interventions=service.coordinator.interventions,
         told=told,
     )
+
+
+def _let_drive(
+    session: Session,
+    service: Service,
+    road: DriversInSumo,
+    meter: Meter | None,
+    look_steps: int,
+    cap_step: int,
+) -> None:
+    """Lets SUMO run until it is empty; tells the service so far each ``look_steps``, and obeys."""
+    step = 0
+    while step < cap_step and (step == 0 or session.vehicles_left()):
+        until = min(cap_step, step + look_steps)
+        readings = [] if meter is None else [meter.read(step, until)]
+        session.step_to(until)
+        road.now_step = step = until
+        commands = service.handle(readings, step)
+        if meter is not None:
+            meter.obey(commands, step)
 
 
 def _told_of_drivers(
     arrivals: Sequence[Arrival],
     samples: Samples,
+    answers: Sequence[Report],
     meter: Meter | None,
     step_s: float,
     end_step: int,
 ) -> Told:
     """Returns the messages of a run of drivers, who are reported and never commanded."""
+    number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
     positions = reports_of_samples(*_motion_of(samples), step_s)
+    positions = with_answers(positions, answers, number, step_s)
     if meter is None:
         return Told(arrivals, [], positions, [], end_step)
     signals = [signal for signal in meter.signals if signal.step <= end_step]
