@@ -24,6 +24,7 @@ from coramp.coordination.admission import (
     undecided_in_lane_order,
 )
 from coramp.coordination.book import ways_of
+from coramp.coordination.commitments import Commitments
 from coramp.coordination.drivers import DriverRoad, sorted_by_taker
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
@@ -36,7 +37,6 @@ from coramp.coordination.gate import (
     admit_until,
     enter,
     entries_of,
-    first_step_from,
     gate_for,
     next_step,
     open_gate,
@@ -52,6 +52,7 @@ from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.events import DetectorReading
 from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, packed
 from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
@@ -118,7 +119,7 @@ class Coordinator:
         drivers: DriverRoad | None = None,
     ) -> None:
         road = rules.road
-        self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(feed))
+        self.ledger = Ledger(len(feed))
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
         self.interventions = 0
@@ -127,6 +128,7 @@ class Coordinator:
         self._rules = rules
         self._packed = packed(rules)
         self._examiner = Examiner(bounds_of(rules), len(feed))
+        self._commitments = Commitments(self.ledger, self._examiner, road)
         self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
@@ -191,8 +193,7 @@ class Coordinator:
             if stop.why == DONE:
                 return
             if stop.why == FULL:
-                self.ledger.make_room()
-                self._examiner.make_room()
+                self._commitments.make_room()
             elif stop.why == REFUSED:
                 self._note_refusal(stop.step, len(self.ledger), stop.code)
 
@@ -269,8 +270,7 @@ class Coordinator:
 
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts who asks to enter on the road, from that station; False where that is not safe."""
-        self.ledger.make_room()
-        self._examiner.make_room()
+        self._commitments.make_room()
         code = enter(
             self.ledger.book,
             self._examiner.record,
@@ -290,9 +290,7 @@ class Coordinator:
         self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
-        now_s = step * self._step_s
-        self.ledger.commit(row, pieces, merge_time_s, now_s)
-        self._examiner.note(row, pieces, merge_time_s, now_s)
+        self._commitments.change(row, pieces, merge_time_s, step * self._step_s)
         if has_place_on_mainline(
             merge_time_s
         ):  # it is planned: nothing is due at its decision station
@@ -405,12 +403,11 @@ class Coordinator:
     def drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> int:
         """Carries out what is safe of commanded accelerations; returns how many were refused."""
         carried_out = drive_safely(
-            self.ledger,
+            self._commitments,
             commands,
             step * self._step_s,
             self._fastest_entry_mps,
             self._packed,
-            self._examiner,
         )
         for command, driven in zip(commands, carried_out, strict=True):
             if driven:

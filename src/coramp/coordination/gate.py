@@ -11,21 +11,19 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Entry, examine_entry
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED, TOO_NEAR, TOO_NEAR_AT_MERGE
-from coramp.checker.record import Record, has_room, note_entry
+from coramp.checker.record import Record
 from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import (
     BLOCKS,
     LIVE,
     ROWS,
     Book,
-    add_row,
-    is_full,
     strike_exited,
     ways_of,
 )
-from coramp.coordination.book import write_commitment as write
-from coramp.kinematics.trajectory import MAX_PIECES
+from coramp.coordination.commitments import commit_entry, has_room_for_entry
 from coramp.messages.feed import RequestFeed
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
 from coramp.vehicles.traits import LENGTH, traits_or_usual
@@ -223,9 +221,7 @@ def admit_until(
         _hear(gate, step)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if is_full(
-                    book.used, len(book.live), len(book.block_row), len(book.pieces)
-                ) or not has_room(record, MAX_PIECES):
+                if not has_room_for_entry(book, record):
                     return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 if _is_as_refused(book, gate, stream, arrival):
@@ -300,18 +296,19 @@ def enter(
     code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
         return code
-    row, road = add_row(book, traits, on_ramp), rules.road
-    note_entry(record, traits, book.merge_time_s[row], pieces, bounds.zone_end_m)
-    merge_s = book.merge_time_s[row]
-    write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
+    road = rules.road
+    row = commit_entry(
+        book,
+        record,
+        traits,
+        on_ramp,
+        pieces,
+        time_s,
+        road.mainline_speed_mps,
+        road.mainline_end_m,
+    )
     gate.row_arrival[row], gate.row_step[row] = arrival, step
     if on_ramp:
         due_s = decision_due_s(pieces, road.decision_station_m)
         gate.row_due_step[row] = max(step, first_step_from(due_s, rules.control.step_s))
     return code
-
-
-@kernel
-def first_step_from(time_s: float, step_s: float) -> int:
-    """Returns the first step at or after a time."""
-    return int(np.ceil(time_s / step_s - 1e-6))

@@ -14,11 +14,9 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Change, examine
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED
-from coramp.checker.record import Record, note_command
+from coramp.checker.record import Record
 from coramp.coordination.book import Book, fleet_of
-from coramp.coordination.book import write_commitment as write
-from coramp.coordination.examination import Examiner
-from coramp.coordination.ledger import Ledger
+from coramp.coordination.commitments import Commitments, commit_change
 from coramp.equations.safe_distance import merge_clearance_m, standing_clearance_m
 from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m
 from coramp.motion.approach import stop_of_m
@@ -36,29 +34,27 @@ MOST_PASSES = 3
 
 
 def drive_safely(
-    ledger: Ledger,
+    commitments: Commitments,
     commands: Sequence[DriveWithAcceleration],
     now_s: float,
     fastest_entry_mps: float,
     packed_rules: FloatArray,
-    examiner: Examiner,
 ) -> list[bool]:
     """Commits what is safe of the commands; returns for each whether it was carried out."""
     rows = np.array([command.row for command in commands], np.int64)
     wishes = np.array([(c.accel_mps2, c.hold_s) for c in commands])
     merges = np.array([command.merge for command in commands], np.bool_)
-    ledger.make_room(len(rows))
-    examiner.make_room(len(rows))
+    commitments.make_room(len(rows))
     done: BoolArray = drive_all(
-        ledger.book,
-        examiner.record,
+        commitments.ledger.book,
+        commitments.examiner.record,
         rows,
         wishes,
         merges,
         now_s,
         fastest_entry_mps,
         packed_rules,
-        examiner.bounds,
+        commitments.examiner.bounds,
     )
     return done.tolist()  # type: ignore[no-any-return]
 
@@ -170,6 +166,6 @@ def _commit_if_safe(
     )
     if examine(record, change, now_s, from_s, bounds).code != ACCEPTED:
         return False
-    note_command(record, row, merge_s, pieces, now_s, bounds.zone_end_m)
-    write(book, row, pieces, merge_s, now_s, road.mainline_speed_mps, road.mainline_end_m)
+    cruise_mps, zone_end_m = road.mainline_speed_mps, road.mainline_end_m
+    commit_change(book, record, row, pieces, merge_s, now_s, cruise_mps, zone_end_m)
     return True

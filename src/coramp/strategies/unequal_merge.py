@@ -19,8 +19,9 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_at_station,
 )
+from coramp.motion.clock import ON_GRID
 from coramp.motion.following import Leader, follow_safely, speed_up
-from coramp.motion.lane_change import ON_GRID, lane_change_s
+from coramp.motion.lane_change import lane_change_s
 from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.proposals import find_unsafe_pair
