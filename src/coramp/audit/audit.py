@@ -29,6 +29,7 @@ from coramp.audit.figures import Derived, derive
 from coramp.audit.inputs import Inputs, read_inputs
 from coramp.audit.kinematics import ROUNDING
 from coramp.audit.orders import Motion, Passages, exits_s, passages_of
+from coramp.audit.positions import steps_from
 from coramp.audit.verdicts import Audit, Check, Finding, finding, judged, unchecked
 from coramp.coordination.examination import bounds_of
 from coramp.errors import CorampError
@@ -154,7 +155,7 @@ def _figures(inputs: Inputs, motion: Motion) -> list[Check]:
     passages = passages_of(inputs.orders, motion, vehicles, bounds.zone_end_m, inputs.end_s)
     merge_s = passages.merge_s
     if not inputs.exact:  # a lane change waits for the next step
-        merge_s = np.ceil(merge_s / step_s - 1e-6) * step_s
+        merge_s = steps_from(merge_s, step_s) * step_s
     passages = passages._replace(merge_s=np.where(merge_s > inputs.end_s, np.nan, merge_s))
     driven = motion if inputs.exact else driven_in_sumo(inputs)[0]
     derived = derive(

@@ -23,7 +23,8 @@ from coramp.messages.events import Report
 from coramp.messages.feed import RequestFeed
 from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
-from coramp.records.outcome import Outcome, Pieces
+from coramp.records.lanes import first_on_mainline_s, seen_history
+from coramp.records.outcome import Outcome, Pieces, until_s
 from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
@@ -162,9 +163,12 @@ def _motion_of(samples: Samples) -> tuple[IntArray, FloatArray, FloatArray, Floa
 
 def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:
     """Returns the outcome with what vehicles drove as SUMO's positions have it, at each step."""
-    first, rows = pieces_of_samples(*_motion_of(samples), len(outcome.passages))
-    lane = np.where(samples.on_mainline, MAINLINE, RAMP)
-    return replace(outcome, driven=Pieces(first, rows), driven_lane=lane)
+    vehicles = len(outcome.passages)
+    first, rows = pieces_of_samples(*_motion_of(samples), vehicles)
+    last_s = np.full(vehicles, np.nan)
+    last_s[samples.vehicle] = samples.time_s  # the last one of each vehicle stays
+    lanes = seen_history(samples.vehicle, samples.on_mainline, samples.time_s, last_s)
+    return replace(outcome, driven=Pieces(first, rows), lanes=lanes)
 
 
 def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) -> Pieces:
@@ -205,17 +209,21 @@ def run_uncontrolled(
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions = files.collisions()
-    entry_s, merge_s, exit_s = _passing_times(
-        samples, arrivals, finished, scenario.mainline.end_m, step_s
-    )
+    entry_s, exit_s = _passing_times(samples, arrivals, finished, scenario.mainline.end_m, step_s)
     first, rows = pieces_of_samples(
         samples.vehicle, samples.time_s, samples.station_m, samples.speed_mps, len(arrivals)
     )
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
+    end_s = float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s
+    lanes = seen_history(
+        samples.vehicle, samples.on_mainline, samples.time_s, until_s(exit_s, end_s)
+    )
+    merge_s = first_on_mainline_s(lanes, len(arrivals))
+    merge_s[[not arrival.on_ramp for arrival in arrivals]] = BY_MAINLINE_S
     told = None
     if options.keep_messages:
-        last_s = float(np.max(exit_s, initial=0.0)) if left else math.inf
+        last_s = end_s if left else math.inf
         end_step = min(cap_step, step_after(last_s, step_s))
         told = _told_of_drivers(arrivals, samples, road.told, meter, step_s, end_step)
     return Outcome(
@@ -224,7 +232,8 @@ def run_uncontrolled(
         pieces=Pieces(first, rows),
         lane=np.where(samples.on_mainline, MAINLINE, RAMP),
         driven=Pieces(first, rows),
-        end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
+        lanes=lanes,
+        end_s=end_s,
         collisions=collisions,
         refusals=tuple(service.coordinator.refusals),
         interventions=service.coordinator.interventions,
@@ -277,20 +286,17 @@ def _passing_times(
     finished: set[str],
     end_m: float,
     step_s: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Entry, merge and exit of each vehicle; its last sample is run on to the zone's end."""
-    entry_s, merge_s, exit_s = (np.full(len(arrivals), np.nan) for _ in range(3))
+) -> tuple[FloatArray, FloatArray]:
+    """Entry and exit of each vehicle; its last sample is run on to the zone's end."""
+    entry_s, exit_s = (np.full(len(arrivals), np.nan) for _ in range(2))
     seen, first = np.unique(samples.vehicle, return_index=True)
     last = np.append(first[1:], len(samples.vehicle))[: len(first)] - 1
     entry_s[seen] = samples.time_s[first]
-    merged, at = np.unique(samples.vehicle[samples.on_mainline], return_index=True)
-    merge_s[merged] = samples.time_s[samples.on_mainline][at]
-    merge_s[[not arrival.on_ramp for arrival in arrivals]] = BY_MAINLINE_S
     left_m = end_m - samples.station_m[last]
     run_on_s = np.minimum(left_m / np.maximum(samples.speed_mps[last], 1e-9), step_s)
     exit_s[seen] = samples.time_s[last] + run_on_s
     done = np.array([arrival.vehicle_id in finished for arrival in arrivals], np.bool_)
-    return entry_s, merge_s, np.where(done, exit_s, np.nan)
+    return entry_s, np.where(done, exit_s, np.nan)
 
 
 class _Files:
