@@ -127,8 +127,8 @@ class Coordinator:
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
-        self._examiner = Examiner(bounds_of(rules), len(feed))
-        self._commitments = Commitments(self.ledger, self._examiner, road)
+        examiner = Examiner(bounds_of(rules), len(feed))
+        self._commitments = Commitments(self.ledger, examiner, road)
         self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
@@ -183,11 +183,11 @@ class Coordinator:
         while True:
             stop = admit_until(
                 self.ledger.book,
-                self._examiner.record,
+                self._commitments.examiner.record,
                 self._gate,
                 last_step,
                 self._packed,
-                self._examiner.bounds,
+                self._commitments.examiner.bounds,
             )
             last_step = min(last_step, self._announce_entries())
             if stop.why == DONE:
@@ -273,13 +273,13 @@ class Coordinator:
         self._commitments.make_room()
         code = enter(
             self.ledger.book,
-            self._examiner.record,
+            self._commitments.examiner.record,
             self._gate,
             number,
             station_m,
             step,
             self._rules,
-            self._examiner.bounds,
+            self._commitments.examiner.bounds,
         )
         if code not in (ACCEPTED, WAITS):
             self._note_refusal(step, len(self.ledger), code)
@@ -324,7 +324,7 @@ class Coordinator:
         ]
         if not moves or not (self._asks_at_entry or row in [move.row for move in moves]):
             return False
-        verdict = self._examiner.change(moves, time_s, from_s)
+        verdict = self._commitments.examiner.change(moves, time_s, from_s)
         if verdict.code != ACCEPTED:
             self._note_refusal(step, row, verdict.code)
             return False
@@ -391,7 +391,7 @@ class Coordinator:
 
     def _verdict_on(self, trajectories: Sequence[FollowTrajectory], time_s: float) -> Verdict:
         earliest_s = time_s + self._rules.control.actuation_delay_s
-        verdict = self._examiner.change(trajectories, time_s, earliest_s)
+        verdict = self._commitments.examiner.change(trajectories, time_s, earliest_s)
         if (
             verdict.code == ACCEPTED
             and not (self._holds_newcomers or self._rules.traffic.differs)
