@@ -24,7 +24,7 @@ SCENARIO = load_scenario(
     },
 )
 LAST_STEP = 600
-WRITERS = ("write_commitment(", "add_row(", "note_entry(", "note_command(")
+WRITERS = ("write_commitment(", "note_entry(", "note_command(")
 """Kernels that only ``commitments`` may call, and where they stand."""
 PLACES = {"coordination/commitments.py", "coordination/book.py", "checker/record.py"}
 

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coramp.coordination.book import add_row, write_commitment
+from coramp.checker.record import empty_record
+from coramp.coordination.commitments import commit_entry
 from coramp.coordination.ledger import Ledger
 from coramp.road.rules import packed
 from coramp.scenarios.loading import load_scenario
@@ -18,7 +19,6 @@ from coramp.strategies.feedback import (
 )
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.virtual_platoon import VirtualPlatoon
-from coramp.vehicles.merge_state import merge_time_at_entry_s
 from tests.mathematics import sized
 
 RULES = load_scenario("paper").rules()
@@ -42,12 +42,10 @@ def two(gap_m, front_mps, rear_mps, rear_m=-200.0, stages=(MAINLINE, MAINLINE)):
 
 def on_the_road(*vehicles):
     """The platoon of vehicles ``(stream, station, speed)`` that cruise or, on the ramp, stop."""
-    ledger = Ledger()
+    ledger, record = Ledger(), empty_record(16, 128)
     for stream, station_m, speed_mps in vehicles:
-        merge_s = merge_time_at_entry_s(stream == "r")
-        row = add_row(ledger.book, sized(LENGTH_M), stream == "r")
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
-        write_commitment(ledger.book, row, pieces, merge_s, 0.0, 20.0, 400.0)
+        commit_entry(ledger.book, record, sized(LENGTH_M), stream == "r", pieces, 0.0, 20.0, 400.0)
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))
 
 

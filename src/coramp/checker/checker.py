@@ -35,11 +35,12 @@ from coramp.checker.reasons import (
     NOT_FINITE,
     STARTS_TOO_EARLY,
     STARTS_TOO_LATE,
+    TAKES_NO_COMMANDS,
     TIMES_NOT_ASCENDING,
     TOO_FAST,
     TOO_HARD,
 )
-from coramp.checker.record import LIVE, Record, forget_exited, way_of
+from coramp.checker.record import LIVE, ROWS, Record, forget_exited, way_of
 
 
 class Change(NamedTuple):
@@ -175,6 +176,8 @@ def _examine_command(
     record: Record, change: Change, k: int, earliest_s: float, bounds: Bounds
 ) -> int:
     """Returns the reason why one new trajectory may not be commanded, by itself."""
+    if not 0 <= change.rows[k] < record.used[ROWS]:
+        return TAKES_NO_COMMANDS
     pieces = change.pieces[k, : change.piece_count[k]]
     merge_s = change.merge_s[k]
     before = way_of(record, change.rows[k])

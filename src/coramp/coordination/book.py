@@ -19,12 +19,8 @@ from coramp.kinematics.trajectory import (
     time_at_station,
 )
 from coramp.vehicles.fleet import Fleet, committed
-from coramp.vehicles.merge_state import (
-    NOT_PLANNED_S,
-    has_place_on_mainline,
-    merge_time_at_entry_s,
-)
-from coramp.vehicles.traits import LENGTH, Traits
+from coramp.vehicles.merge_state import NOT_PLANNED_S, has_place_on_mainline
+from coramp.vehicles.traits import Traits
 
 ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
 """Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
@@ -185,20 +181,6 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
         book.traits,
         book.live[: book.used[LIVE]],
     )
-
-
-@kernel
-def add_row(book: Book, traits: FloatArray, on_ramp: bool) -> int:
-    """Makes room for a vehicle that is about to enter; returns its row.
-
-    It counts as on the road only with its first commitment.
-    """
-    row = book.used[ROWS]
-    book.length_m[row] = traits[LENGTH]
-    book.traits[row] = traits
-    book.merge_time_s[row] = merge_time_at_entry_s(on_ramp)
-    book.used[ROWS] += 1
-    return int(row)
 
 
 @kernel

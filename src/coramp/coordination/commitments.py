@@ -6,12 +6,15 @@ Kernels write where there is room; ``Commitments`` makes it.
 
 from coramp._kernel import FloatArray, kernel
 from coramp.checker.record import Record, has_room, note_command, note_entry
-from coramp.coordination.book import Book, add_row, is_full, write_commitment
+from coramp.coordination.book import ROWS, Book, is_full, write_commitment
 from coramp.coordination.examination import Examiner
 from coramp.coordination.ledger import Ledger
 from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.road.rules import Road
 from coramp.vehicles.merge_state import merge_time_at_entry_s
+from coramp.vehicles.traits import LENGTH
+
+NO_ROOM = -1
 
 
 class Commitments:
@@ -42,13 +45,6 @@ class Commitments:
 
 
 @kernel
-def has_room_for_entry(book: Book, record: Record) -> bool:
-    """Returns whether one more vehicle can enter; after an entry there must be room anew."""
-    full = is_full(book.used, len(book.live), len(book.block_row), len(book.pieces))
-    return not full and has_room(record, MAX_PIECES)
-
-
-@kernel
 def commit_entry(
     book: Book,
     record: Record,
@@ -59,12 +55,20 @@ def commit_entry(
     cruise_mps: float,
     zone_end_m: float,
 ) -> int:
-    """Commits a vehicle that enters at ``now_s`` to ``pieces``; returns its row."""
-    merge_s = merge_time_at_entry_s(on_ramp)
+    """Commits a vehicle that enters at ``now_s`` to ``pieces``; returns its row.
+
+    Where there is no room for it, it changes nothing and returns ``NO_ROOM``.
+    """
+    full = is_full(book.used, len(book.live), len(book.block_row), len(book.pieces))
+    if full or not has_room(record, MAX_PIECES):
+        return NO_ROOM
+    merge_s, row = merge_time_at_entry_s(on_ramp), book.used[ROWS]
     note_entry(record, traits, merge_s, pieces, zone_end_m)
-    row = add_row(book, traits, on_ramp)
+    book.length_m[row] = traits[LENGTH]
+    book.traits[row] = traits
+    book.used[ROWS] += 1
     write_commitment(book, row, pieces, merge_s, now_s, cruise_mps, zone_end_m)
-    return row
+    return int(row)
 
 
 @kernel

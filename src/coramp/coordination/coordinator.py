@@ -14,7 +14,6 @@ from coramp.checker.reasons import (
     ACCEPTED,
     HOLDS_NEWCOMERS,
     REASONS,
-    TAKES_NO_COMMANDS,
     TOO_NEAR,
     TOO_NEAR_AT_MERGE,
 )
@@ -56,6 +55,7 @@ from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, packed
 from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
+    Command,
     Decider,
     Decision,
     Detectors,
@@ -359,18 +359,12 @@ class Coordinator:
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
         """Commits what a decision commands, or what is safe instead, and notes its wakes."""
         time_s = step * self._step_s
-        given = sorted_by_taker(decision.commands)
-        without_signal = sum(not self._drivers.show(signal, step) for signal in given.signals)
-        self.interventions += given.refused + without_signal
-        if given.drives:
-            self.drive(given.drives, step)
-        trajectories = given.trajectories
+        trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]
+        if len(trajectories) < len(decision.commands):
+            self._carry_out_others(decision.commands, step)
         margin_m = math.nan
         if trajectories:
-            if given.to_drivers:
-                verdict = Verdict(TAKES_NO_COMMANDS, -1, -1, math.nan)
-            else:
-                verdict = self._verdict_on(trajectories, time_s)
+            verdict = self._verdict_on(trajectories, time_s)
             if verdict.code != ACCEPTED:
                 self.interventions += 1
                 self._refuse(decision, subjects, step, verdict)
@@ -388,6 +382,13 @@ class Coordinator:
                 self._moves_up_in_time(row, step, wake_step)
             elif wake_step > step:
                 self._moves_up(row, step)
+
+    def _carry_out_others(self, commands: Sequence[Command], step: int) -> None:
+        given = sorted_by_taker(commands)
+        without_signal = sum(not self._drivers.show(signal, step) for signal in given.signals)
+        self.interventions += given.refused + without_signal
+        if given.drives:
+            self.drive(given.drives, step)
 
     def _verdict_on(self, trajectories: Sequence[FollowTrajectory], time_s: float) -> Verdict:
         earliest_s = time_s + self._rules.control.actuation_delay_s

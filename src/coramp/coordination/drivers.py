@@ -11,7 +11,6 @@ from coramp.strategies.base import (
     Command,
     Drivers,
     DriveWithAcceleration,
-    FollowTrajectory,
     ReleaseToDriver,
     Reports,
     SetRampSignal,
@@ -65,35 +64,25 @@ class DriverRoad:
 
 
 class Sorted(NamedTuple):
-    """The commands of a decision by whom they are for.
+    """The commands of a decision that are no trajectories, by whom they are for.
 
-    ``to_drivers`` tells that a trajectory is for a driver; ``refused`` counts the other commands
-    that nobody can carry out.
+    ``refused`` counts those that nobody can carry out.
     """
 
-    trajectories: list[FollowTrajectory]
     drives: list[DriveWithAcceleration]
     signals: list[SetRampSignal]
-    to_drivers: bool
     refused: int
 
 
 def sorted_by_taker(commands: Sequence[Command]) -> Sorted:
-    """Returns which commands vehicles and signal can carry out.
+    """Returns which commands, trajectories aside, vehicles and signal can carry out.
 
-    Accelerations for drivers are refused one by one, trajectories all together. Releasing a driver
-    changes nothing; an automated vehicle has no driver to be left to.
+    Accelerations for drivers are refused one by one. Releasing a driver changes nothing; an
+    automated vehicle has no driver to be left to. Trajectories the checker refuses all together.
     """
-    trajectories = [c for c in commands if isinstance(c, FollowTrajectory)]
-    if len(trajectories) == len(commands):
-        drives: list[DriveWithAcceleration] = []
-        signals: list[SetRampSignal] = []
-        released: list[ReleaseToDriver] = []
-    else:
-        drives = [c for c in commands if isinstance(c, DriveWithAcceleration)]
-        signals = [c for c in commands if isinstance(c, SetRampSignal)]
-        released = [c for c in commands if isinstance(c, ReleaseToDriver)]
+    drives = [c for c in commands if isinstance(c, DriveWithAcceleration)]
+    signals = [c for c in commands if isinstance(c, SetRampSignal)]
+    released = [c for c in commands if isinstance(c, ReleaseToDriver)]
     taken = [c for c in drives if c.row > NOBODY]
     refused = len(drives) - len(taken) + sum(c.row > NOBODY for c in released)
-    to_drivers = any(c.row < NOBODY for c in trajectories)
-    return Sorted(trajectories, taken, signals, to_drivers, refused)
+    return Sorted(taken, signals, refused)

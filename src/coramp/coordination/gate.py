@@ -21,7 +21,7 @@ from coramp.coordination.book import (
     strike_exited,
     ways_of,
 )
-from coramp.coordination.commitments import commit_entry, has_room_for_entry
+from coramp.coordination.commitments import NO_ROOM, commit_entry
 from coramp.messages.feed import RequestFeed
 from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, unpacked
@@ -29,7 +29,7 @@ from coramp.strategies.base import Entered, Waiting
 from coramp.vehicles.traits import LENGTH, traits_or_usual
 
 NEVER = 1 << 60
-WAITS = -1
+WAITS, CROWDED = -1, -2
 HEARD, OFFERED, OPEN = range(3)
 """Places in ``Gate.feed``."""
 DONE, FULL, REFUSED = range(3)
@@ -221,14 +221,14 @@ def admit_until(
         _hear(gate, step)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if not has_room_for_entry(book, record):
-                    return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 if _is_as_refused(book, gate, stream, arrival):
                     gate.try_step[stream] = step + 1
                     continue
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
                 code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
+                if code == CROWDED:
+                    return Stop(FULL, step, -1, ACCEPTED)
                 if code == ACCEPTED:
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
@@ -276,7 +276,8 @@ def enter(
 ) -> int:
     """Puts an arrival on the road, harmonised from there, if the checker agrees.
 
-    Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, or the checker's reason.
+    Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, ``CROWDED`` where there is no room to
+    write it down, or the checker's reason.
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     traits, speed_mps = traits_or_usual(gate.traits[arrival], rules), gate.speed_mps[arrival]
@@ -307,6 +308,8 @@ def enter(
         road.mainline_speed_mps,
         road.mainline_end_m,
     )
+    if row == NO_ROOM:
+        return CROWDED
     gate.row_arrival[row], gate.row_step[row] = arrival, step
     if on_ramp:
         due_s = decision_due_s(pieces, road.decision_station_m)
