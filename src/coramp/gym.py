@@ -34,6 +34,7 @@ from coramp.strategies.base import (
 from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
 from coramp.strategies.registry import strategy_named
 from coramp.vehicles.fleet import Fleet
+from coramp.vehicles.merge_state import is_waiting
 
 NEIGHBOURS = 2
 """So many vehicles before the agent in the order of merging are seen, and so many behind it."""
@@ -224,7 +225,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
     def _first_on_ramp(self, first: int) -> int:
         """Returns the first row from that one on without a committed merge, -1 for none."""
         ledger = self.loop.ledger
-        waiting = (r for r in range(first, len(ledger)) if ledger.merge_time_s(r) == math.inf)
+        waiting = (r for r in range(first, len(ledger)) if is_waiting(ledger.merge_time_s(r)))
         return next(waiting, -1)
 
     def _look(self) -> Seen:

@@ -21,6 +21,7 @@ from coramp.strategies.base import (
     is_metered,
     period_of,
 )
+from coramp.vehicles.merge_state import is_waiting
 
 LATEST_EXIT_S = 600.0
 """By then everyone who comes within a minute must be gone."""
@@ -97,7 +98,7 @@ def _check(watched: Twice, scenario: Scenario, seed: int) -> None:
     if not watched.cooperative:
         return
     ledger = coordinator.ledger
-    undecided = [row for row in ledger.fleet.live if ledger.merge_time_s(row) == np.inf]
+    undecided = [row for row in ledger.fleet.live if is_waiting(ledger.merge_time_s(row))]
     if undecided:
         raise AssertionError(f"{watched.name} leaves {len(undecided)} ramp vehicles waiting")
     if outside := len(coordinator.waiting()):

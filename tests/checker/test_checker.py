@@ -26,6 +26,7 @@ from coramp.checker.reasons import (
     REASONS,
     STARTS_TOO_EARLY,
     STARTS_TOO_LATE,
+    TAKES_NO_COMMANDS,
     TIMES_NOT_ASCENDING,
     TOO_FAST,
     TOO_HARD,
@@ -134,8 +135,8 @@ def test_merge_with_a_gap_maker_is_accepted_with_its_least_margin():
 
 
 def test_every_reason_has_its_words():
-    assert len(REASONS) == 16
-    assert len(set(REASONS)) == 16
+    assert len(REASONS) == 17
+    assert len(set(REASONS)) == 17
 
 
 # form ---------------------------------------------------------------------------------------
@@ -212,6 +213,12 @@ def test_start_must_be_where_the_vehicle_is(column, side):
 
 
 # the past -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("row", [-2, -1, len(ROAD)])
+def test_who_was_never_told_of_takes_no_commands(row):
+    found = verdict(New(R, MERGE, 12.0), New(row, MERGE, 12.0))
+    assert (found.code, found.row) == (TAKES_NO_COMMANDS, row)
 
 
 @pytest.mark.parametrize("merge_s", [12.0, UNDECIDED])

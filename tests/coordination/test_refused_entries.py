@@ -4,7 +4,6 @@ import numpy as np
 
 from coramp.checker.reasons import REASONS, TOO_HARD
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.examination import Examiner
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import ACCEL, MAX_PIECES
 from coramp.messages.feed import RequestFeed
@@ -25,7 +24,8 @@ def run_with(comfort_mps2, *arrivals):
     loop = Coordinator(
         strategy_named("mainline-priority")(), RULES, RequestFeed(named(listed)), 20.0
     )
-    loop._examiner = Examiner(loop._examiner.bounds._replace(comfort_mps2=comfort_mps2))
+    examiner = loop._commitments.examiner
+    examiner.bounds = examiner.bounds._replace(comfort_mps2=comfort_mps2)
     loop.expect_arrivals()
     loop.run(LAST_STEP)
     return loop

@@ -9,7 +9,6 @@ import pytest
 
 from coramp.checker.reasons import REASONS, TOO_HARD, TOO_NEAR, TOO_NEAR_AT_MERGE
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.examination import Examiner
 from coramp.coordination.plant import Arrival
 from coramp.equations.printed import EQUATIONS
 from coramp.explain import words
@@ -183,7 +182,8 @@ def loop_of(bounds, *arrivals, until=600):
         RequestFeed(named(listed)),
         20.0,
     )
-    loop._examiner = Examiner(loop._examiner.bounds._replace(**bounds))
+    examiner = loop._commitments.examiner
+    examiner.bounds = examiner.bounds._replace(**bounds)
     loop.expect_arrivals()
     loop.run(until)
     return loop

@@ -108,9 +108,9 @@ FAULTS = (
         "ramp vehicles count on the mainline 0.5 s late",
         (
             Edit(
-                "metrics/lane_uses.py",
-                "np.where(passages.on_ramp, passages.merge_s, passages.entry_s)",
-                "np.where(passages.on_ramp, passages.merge_s + 0.5, passages.entry_s)",
+                "records/lanes.py",
+                "np.where(on_ramp, merge_s, entry_s)",
+                "np.where(on_ramp, merge_s + 0.5, entry_s)",
             ),
         ),
         STEERED,

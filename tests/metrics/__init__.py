@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coramp.coordination.driven import MAINLINE, RAMP
+from coramp.records.lanes import planned_history, seen_history
 from coramp.records.outcome import Outcome, Passages, Pieces
 from coramp.scenarios.loading import load_scenario
 
@@ -77,4 +78,13 @@ def outcome_of(cars, end_s, **rest):
         "collisions": 0,
         **rest,
     }
+    if "lanes" not in content:
+        until_s = np.where(np.isnan(passages.exit_s), end_s, passages.exit_s)
+        if content["cooperative"]:
+            content["lanes"] = planned_history(on_ramp, passages.entry_s, passages.merge_s, until_s)
+        else:
+            vehicle = np.repeat(np.arange(len(cars)), np.diff(first))
+            content["lanes"] = seen_history(
+                vehicle, content["lane"] == MAINLINE, rows[:, 0], until_s
+            )
     return Outcome(passages=passages, pieces=pieces, end_s=end_s, **content)

@@ -5,6 +5,7 @@ import pytest
 
 import coramp
 from coramp.metrics.queues import crossings, queue_figures
+from coramp.records.lanes import planned_history
 from coramp.records.outcome import Outcome, Passages, Pieces
 from coramp.scenarios.loading import load_scenario
 
@@ -35,7 +36,9 @@ def outcome(groups, ramp=False):
         nothing,
     )
     pieces = Pieces(np.arange(count + 1), rows)
-    return Outcome(False, passages, pieces, np.full(count, 2), pieces, float(exit_s.max()), 0)
+    lanes = planned_history(passages.on_ramp, entry_s, passages.merge_s, exit_s)
+    lane = np.full(count, 2)
+    return Outcome(False, passages, pieces, lane, pieces, lanes, float(exit_s.max()), 0)
 
 
 def passing(from_s, to_s, every_s, speed_mps):

@@ -18,7 +18,7 @@ RULES = load_scenario("paper").rules()
 
 
 def view(time_s, occupancy=0.0, queue=0.0, passed=0):
-    fleet = Ledger(20.0, 400.0).fleet
+    fleet = Ledger().fleet
     return View(
         time_s,
         (),

@@ -1,13 +1,12 @@
 """Feedback laws: what they settle at, and barriers that hold between samples too."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coramp.coordination.book import add_row
+from coramp.checker.record import empty_record
+from coramp.coordination.commitments import commit_entry
 from coramp.coordination.ledger import Ledger
 from coramp.road.rules import packed
 from coramp.scenarios.loading import load_scenario
@@ -43,11 +42,10 @@ def two(gap_m, front_mps, rear_mps, rear_m=-200.0, stages=(MAINLINE, MAINLINE)):
 
 def on_the_road(*vehicles):
     """The platoon of vehicles ``(stream, station, speed)`` that cruise or, on the ramp, stop."""
-    ledger = Ledger(20.0, 400.0)
+    ledger, record = Ledger(), empty_record(16, 128)
     for stream, station_m, speed_mps in vehicles:
-        row = add_row(ledger.book, sized(LENGTH_M), stream == "r")
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
-        ledger.commit(row, pieces, math.inf if stream == "r" else -math.inf, 0.0)
+        commit_entry(ledger.book, record, sized(LENGTH_M), stream == "r", pieces, 0.0, 20.0, 400.0)
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))
 
 

@@ -12,6 +12,7 @@ from coramp.audit.decisions import (
     check_records,
     check_requests,
     check_signals,
+    steps_between_looks,
 )
 from coramp.audit.driving import (
     PLAN_ERROR_M,
@@ -28,6 +29,7 @@ from coramp.audit.figures import Derived, derive
 from coramp.audit.inputs import Inputs, read_inputs
 from coramp.audit.kinematics import ROUNDING
 from coramp.audit.orders import Motion, Passages, exits_s, passages_of
+from coramp.audit.positions import steps_from
 from coramp.audit.verdicts import Audit, Check, Finding, finding, judged, unchecked
 from coramp.coordination.examination import bounds_of
 from coramp.errors import CorampError
@@ -134,12 +136,13 @@ def _strangers(inputs: Inputs) -> Check:
 def _of_drivers(inputs: Inputs) -> list[Check]:
     """What can be confirmed of SUMO's own drivers, and what cannot."""
     commanded = inputs.order_rows
-    checks = check_positions(inputs)
+    strategy = strategy_named(inputs.run.content["strategy"])
+    checks = check_positions(inputs, steps_between_looks(inputs))
     text = "commands a driver; drivers take no commands"
     findings = [finding(inputs.log, int(row), "a decision", text) for row in commanded]
     checks.append(judged("no vehicle was commanded", "no trajectory in the log", findings))
     checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))
-    if is_metered(strategy_named(inputs.run.content["strategy"])):
+    if is_metered(strategy):
         checks.insert(0, check_signals(inputs))
     return [*checks, *(unchecked(name, TOO_SELDOM) for name in FIGURES)]
 
@@ -152,7 +155,7 @@ def _figures(inputs: Inputs, motion: Motion) -> list[Check]:
     passages = passages_of(inputs.orders, motion, vehicles, bounds.zone_end_m, inputs.end_s)
     merge_s = passages.merge_s
     if not inputs.exact:  # a lane change waits for the next step
-        merge_s = np.ceil(merge_s / step_s - 1e-6) * step_s
+        merge_s = steps_from(merge_s, step_s) * step_s
     passages = passages._replace(merge_s=np.where(merge_s > inputs.end_s, np.nan, merge_s))
     driven = motion if inputs.exact else driven_in_sumo(inputs)[0]
     derived = derive(

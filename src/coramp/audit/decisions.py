@@ -117,12 +117,19 @@ def _instead(inputs: Inputs, due: Orders, place: int) -> str:
     return f"{does.format(who)} at {due.time_s[place]:.3f} s"
 
 
+def steps_between_looks(inputs: Inputs) -> int:
+    """Returns after how many steps each a strategy for drivers is asked, 0 if it never is."""
+    name = inputs.run.content["strategy"]
+    period_s = period_of(strategy_to_run(name, inputs.scenario.strategy.get(name)))
+    return 0 if period_s is None else steps_of_period(period_s, inputs.step_s)
+
+
 def check_signals(inputs: Inputs) -> Check:
     """Feeds the readings to a fresh strategy and compares every colour commanded."""
     name, log = inputs.run.content["strategy"], inputs.log
     strategy = strategy_to_run(name, inputs.scenario.strategy.get(name))
     due = replayed_signals(log, inputs.scenario, strategy)
-    findings = _readings(inputs, steps_of_period(period_of(strategy) or 1.0, inputs.step_s))
+    findings = _readings(inputs, steps_between_looks(inputs))
     rows = log.of_kind(SIGNAL)
     told = list(zip(log.step[rows].tolist(), log.frame["green"].gather(rows), strict=True))
     wanted = [(signal.step, signal.green) for signal in due]

@@ -75,13 +75,17 @@ def _told_off(off: FloatArray, allowed_m: float) -> str:
     )
 
 
-def check_completeness(inputs: Inputs, motion: Motion) -> Check:
-    """Looks for reports that are missing, or told twice."""
+def check_completeness(inputs: Inputs, motion: Motion, looks: int = 0) -> Check:
+    """Looks for reports that are missing, told twice, or not due.
+
+    ``looks`` is after how many steps each a strategy may have asked for reports, of the step
+    before; 0 if it never does.
+    """
     log, end_m, period = inputs.log, inputs.scenario.mainline.end_m, report_steps(inputs.step_s)
     reports = log.of_kind(REPORT)
     obeying = ~np.isnan(log.numbers("accel_mps2")[reports])
     due = due_reports(motion, end_m, inputs.step_s, period, log.end_step)
-    findings = _unmatched(inputs, reports[~obeying], due, "report")
+    findings = _unmatched(inputs, reports[~obeying], due, "report", looks)
     told = len(reports) - int(obeying.sum())
     if len(inputs.orders.vehicle) and not inputs.exact:
         compared = log.of_kind(COMPARISON)
@@ -94,11 +98,15 @@ def check_completeness(inputs: Inputs, motion: Motion) -> Check:
     return judged("reports are complete", how, sorted(findings, key=lambda f: f.row or 0))
 
 
-def _unmatched(inputs: Inputs, rows: IntArray, due: IntArray, what: str) -> list[Finding]:
+def _unmatched(
+    inputs: Inputs, rows: IntArray, due: IntArray, what: str, looks: int = 0
+) -> list[Finding]:
     log = inputs.log
     findings = [*_missing(inputs, rows, due, what), *_told_twice(inputs, rows)]
     if what == "report":
         odd = log.step[rows] % report_steps(inputs.step_s) != 0
+        if looks:
+            odd &= (log.step[rows] + 1) % looks != 0
         findings += [
             finding(log, int(row), COMMITMENT, "is not due: reports come each whole second")
             for row in rows[odd].tolist()
@@ -208,8 +216,11 @@ def check_trajectories(inputs: Inputs, motion: Motion) -> Check:
     return judged("trajectories.parquet", f"{table.height} pieces are those commanded", findings)
 
 
-def check_positions(inputs: Inputs) -> list[Check]:
-    """Compares the reports of drivers with ``positions.parquet``, and looks for missing ones."""
+def check_positions(inputs: Inputs, looks: int) -> list[Check]:
+    """Compares the reports of drivers with ``positions.parquet``, and looks for missing ones.
+
+    ``looks`` is that of ``check_completeness``.
+    """
     log, table = inputs.log, inputs.run.positions
     if table is None:
         missing = Finding("the run's folder", "positions.parquet is missing")
@@ -229,7 +240,7 @@ def check_positions(inputs: Inputs) -> list[Check]:
         for k in np.flatnonzero(~(np.abs(off[:, 0]) <= SAMPLED_M)).tolist()
     ]
     how = f"{len(reports)} reports within {SAMPLED_M:g} m of positions.parquet"
-    return [judged("reports", how, findings), check_completeness(inputs, motion)]
+    return [judged("reports", how, findings), check_completeness(inputs, motion, looks)]
 
 
 def ordered(inputs: Inputs) -> Motion:

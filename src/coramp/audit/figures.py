@@ -20,6 +20,7 @@ from coramp.audit.neighbours import (
 )
 from coramp.audit.orders import Askers, Motion, Passages, exits_s, under_way
 from coramp.checker.distances import Bounds
+from coramp.checker.merging import NOT_COMMANDED
 
 HARD_S = 0.2
 STANDING_MPS = 0.1
@@ -100,7 +101,7 @@ def _finite(value: float) -> float | None:
 def _lanes(askers: Askers, passages: Passages, gone_s: FloatArray) -> tuple[Stays, Stays]:
     """Returns who used the mainline, and who the ramp with its acceleration lane."""
     everyone = np.arange(len(gone_s))
-    merged_s = np.where(np.isnan(passages.merge_s), np.inf, passages.merge_s)
+    merged_s = np.where(np.isnan(passages.merge_s), NOT_COMMANDED, passages.merge_s)
     mainline_s = np.where(askers.on_ramp, merged_s, passages.entry_s)
     ramp_s = np.where(askers.on_ramp, passages.entry_s, np.nan)
     return (

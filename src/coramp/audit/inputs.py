@@ -8,6 +8,7 @@ import numpy as np
 
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
+from coramp.checker.merging import NOT_COMMANDED, ON_IT_AT_ENTRY
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.log import COMMAND, ENTRY, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog, read_log
@@ -77,7 +78,7 @@ def _askers(log: MessageLog, scenario: Scenario) -> Askers:
 def _orders(log: MessageLog, askers: Askers, rows: IntArray) -> Orders:
     told = log.frame[rows]
     vehicle = log.vehicle[rows]
-    none = np.where(askers.on_ramp[vehicle], np.inf, -np.inf)
+    none = np.where(askers.on_ramp[vehicle], NOT_COMMANDED, ON_IT_AT_ENTRY)
     merge_s = told["merge_time_s"].fill_null(np.nan).to_numpy()
     counts = np.diff(log.first)[rows]
     return Orders(

@@ -15,6 +15,7 @@ from coramp.checker.distances import (
     Bounds,
     state_at,
 )
+from coramp.checker.merging import comes_onto_mainline
 
 (
     FINE,
@@ -159,7 +160,7 @@ def _keeps_limits(
             limit_mps = bounds.ramp_limit_mps
         limit_mps = max(min(limit_mps, able[TOP_SPEED]), pieces[0, 2])
         most_mps2 = bounds.comfort_mps2
-        if a > 0.0 and s > -ROUNDING and before_merge and merge_s < math.inf:
+        if a > 0.0 and s > -ROUNDING and before_merge and comes_onto_mainline(merge_s):
             most_mps2 = bounds.ramp_acceleration_mps2
         if a > 0.0:
             ends_mps = pieces[i + 1, 2] if i + 1 < len(pieces) else v
@@ -182,7 +183,7 @@ def _ends_well(pieces: FloatArray, merge_s: float, bounds: Bounds) -> tuple[int,
     _, s, v, a = pieces[len(pieces) - 1]
     if a != 0.0:
         return NO_END, math.nan, math.nan
-    if merge_s == math.inf:
+    if not comes_onto_mainline(merge_s):
         if abs(v) > ROUNDING or s > bounds.stop_station_m + ROUNDING:
             return NO_END, math.nan, math.nan
         return FINE, math.nan, math.nan

@@ -24,8 +24,8 @@ class Askers(NamedTuple):
 class Orders(NamedTuple):
     """All trajectories that were commanded, one entry each, in their order.
 
-    Order k is ``pieces[first[k] : first[k + 1]]``. ``merge_s`` is minus infinity on the mainline,
-    infinity where no merge is commanded.
+    Order k is ``pieces[first[k] : first[k + 1]]``. ``merge_s`` is as
+    ``checker.merging`` reads it.
     """
 
     vehicle: IntArray

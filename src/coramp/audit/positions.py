@@ -60,6 +60,11 @@ def due_reports(
     return found
 
 
+def steps_from(time_s: FloatArray, step_s: float) -> FloatArray:
+    """Returns the first step of the control clock at or after each time."""
+    return np.asarray(np.ceil(time_s / step_s - ON_GRID))
+
+
 def expected_in_sumo(
     orders: Orders, zone_end_m: float, step_s: float, end_step: int
 ) -> tuple[IntArray, IntArray]:
@@ -74,14 +79,14 @@ def expected_in_sumo(
     by_vehicle = np.argsort(orders.vehicle, kind="stable")
     same = orders.vehicle[by_vehicle[1:]] == orders.vehicle[by_vehicle[:-1]]
     until[by_vehicle[:-1][same]] = starts[by_vehicle[1:][same]]
-    merges = np.ceil(orders.merge_s / step_s - ON_GRID)
+    merges = steps_from(orders.merge_s, step_s)
     exits_s = np.array(
         [
             passes_s(orders.pieces[begin:end], zone_end_m - BEFORE_EXIT_M)
             for begin, end in zip(orders.first[:-1], orders.first[1:], strict=True)
         ]
     )
-    lasts = np.ceil(exits_s / step_s - ON_GRID) - 1.0
+    lasts = steps_from(exits_s, step_s) - 1.0
     merged = _chosen(orders, merges, (merges - 1.0 >= starts) & (merges < until), end_step)
     left = _chosen(orders, lasts, (lasts >= starts) & (lasts < until), end_step)
     begun = _chosen(orders, starts, (lasts >= starts) & (starts < until), end_step)

@@ -2,13 +2,15 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.metered import MeteredRoad
+from coramp.coordination.service import Service
 from coramp.messages.channel import Channel
 from coramp.messages.commands import Command, SetSignal
-from coramp.messages.events import DetectorReading, RequestToEnter
+from coramp.messages.events import DetectorReading, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
-from coramp.messages.log import READING, TRAIT_COLUMNS
+from coramp.messages.log import KINDS, READING, REPORT, TRAIT_COLUMNS
 from coramp.messages.reading import MessageLog
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
@@ -73,6 +75,28 @@ def replayed(log: MessageLog, scenario: Scenario, strategy: Decider, last_step: 
 
 
 def replayed_signals(log: MessageLog, scenario: Scenario, strategy: Decider) -> list[SetSignal]:
-    """Returns which colours a strategy commands that is told the readings of the log."""
-    road = MeteredRoad(strategy, scenario.rules(), scenario.fastest_mainline_entry_mps)
-    return [signal for reading in readings_in(log) for signal in road.handle(reading)]
+    """Returns which colours a strategy commands that is told the readings of the log.
+
+    Drivers whom it asks for their reports answer as in the log, for the step before.
+    """
+    step, step_s, signals = 0, scenario.control.step_s, []
+    service = Service(
+        strategy,
+        scenario.rules(),
+        scenario.fastest_mainline_entry_mps,
+        lambda: reports_at(log, step - 1),
+    )
+    by_step: dict[int, list[DetectorReading]] = {}
+    for reading in readings_in(log):
+        by_step.setdefault(round(reading.time_s / step_s), []).append(reading)
+    for step, readings in sorted(by_step.items()):
+        commands = service.handle(readings, step)
+        signals += [command for command in commands if isinstance(command, SetSignal)]
+    return signals
+
+
+def reports_at(log: MessageLog, step: int) -> list[Report]:
+    """Returns the reports of a step, in the order of the log."""
+    rows = np.flatnonzero((log.step == step) & (log.kind == KINDS.index(REPORT)))
+    told = log.frame[rows].select("vehicle_id", "time_s", "station_m", "speed_mps")
+    return [Report(*row) for row in told.iter_rows()]

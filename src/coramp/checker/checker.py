@@ -14,6 +14,7 @@ from coramp.checker.distances import (
     Bounds,
     state_at,
 )
+from coramp.checker.merging import comes_onto_mainline, merge_at_entry_s
 from coramp.checker.pairs import (
     Way,
     envelope_on_mainline,
@@ -34,11 +35,12 @@ from coramp.checker.reasons import (
     NOT_FINITE,
     STARTS_TOO_EARLY,
     STARTS_TOO_LATE,
+    TAKES_NO_COMMANDS,
     TIMES_NOT_ASCENDING,
     TOO_FAST,
     TOO_HARD,
 )
-from coramp.checker.record import LIVE, Record, forget_exited, way_of
+from coramp.checker.record import LIVE, ROWS, Record, forget_exited, way_of
 
 
 class Change(NamedTuple):
@@ -115,7 +117,7 @@ def examine(
 def examine_entry(record: Record, entry: Entry, pieces: FloatArray, bounds: Bounds) -> Verdict:
     """Returns whether a vehicle may enter on ``pieces``, and the least margin that it leaves."""
     forget_exited(record, entry.time_s)
-    merge_s = math.inf if entry.on_ramp else -math.inf
+    merge_s = merge_at_entry_s(entry.on_ramp)
     code = _examine_form(pieces, merge_s)
     if code == ACCEPTED:
         code = _examine_start(pieces, entry.time_s, entry.time_s, entry.station_m, entry.speed_mps)
@@ -174,6 +176,8 @@ def _examine_command(
     record: Record, change: Change, k: int, earliest_s: float, bounds: Bounds
 ) -> int:
     """Returns the reason why one new trajectory may not be commanded, by itself."""
+    if not 0 <= change.rows[k] < record.used[ROWS]:
+        return TAKES_NO_COMMANDS
     pieces = change.pieces[k, : change.piece_count[k]]
     merge_s = change.merge_s[k]
     before = way_of(record, change.rows[k])
@@ -245,7 +249,7 @@ def _examine_end(pieces: FloatArray, merge_s: float, bounds: Bounds) -> int:
     _, s, v, a = pieces[len(pieces) - 1]
     if a != 0.0:
         return NO_SAFE_END
-    if merge_s == math.inf:
+    if not comes_onto_mainline(merge_s):
         if v > EXACT or s > bounds.stop_station_m + EXACT:
             return NO_SAFE_END
         return ACCEPTED
@@ -295,7 +299,7 @@ def _examine_speeds(
 def _last_merge_s(change: Change) -> float:
     last_s = -math.inf
     for k in range(len(change.rows)):
-        if change.makes_gap[k] == 0 and change.merge_s[k] < math.inf:
+        if change.makes_gap[k] == 0 and comes_onto_mainline(change.merge_s[k]):
             last_s = max(last_s, change.merge_s[k])
     return last_s
 
@@ -310,7 +314,7 @@ def _examine_accelerations(
         most_mps2 = min(bounds.comfort_mps2, traits[BRAKING])
         if a > 0.0:
             most_mps2 = bounds.comfort_mps2
-            if s > -JOIN and t < merge_s < math.inf:
+            if s > -JOIN and t < merge_s and comes_onto_mainline(merge_s):
                 most_mps2 = bounds.ramp_acceleration_mps2
             most_mps2 = min(most_mps2, traits[ACCELERATION])
             ends_mps = pieces[i + 1, 2] if i + 1 < len(pieces) else v

@@ -19,11 +19,12 @@ from coramp.checker.distances import (
     passes_s,
     state_at,
 )
+from coramp.checker.merging import comes_onto_mainline
 from coramp.checker.reasons import ACCEPTED, EXACT, TOO_NEAR, TOO_NEAR_AT_MERGE
 
 
 class Way(NamedTuple):
-    """One vehicle's trajectory and merge time (minus infinity on the mainline).
+    """One vehicle's trajectory and merge time (``checker.merging``).
 
     With them come its length, its errors of Eq. 1 and its time gap as a follower: as numbers, since
     kernels handle these faster than an array.
@@ -76,7 +77,7 @@ def examine_pair(mine: Way, theirs: Way, from_s: float, bounds: Bounds) -> tuple
         if least < bounds.allowance_m - EXACT:
             return TOO_NEAR, least
     mainline_from_s = max(mine.merge_s, theirs.merge_s)
-    if mainline_from_s == math.inf:
+    if not comes_onto_mainline(mainline_from_s):
         return ACCEPTED, least
     if mainline_from_s >= from_s:
         if mine.merge_s >= theirs.merge_s:
@@ -97,7 +98,7 @@ def examine_pair(mine: Way, theirs: Way, from_s: float, bounds: Bounds) -> tuple
 def envelope_on_mainline(way: Way, bounds: Bounds) -> Envelope:
     """Returns the envelope of a vehicle from its merge on, unbounded where it has none."""
     from_s = max(way.pieces[0, 0], way.merge_s)
-    if from_s == math.inf:
+    if not comes_onto_mainline(way.merge_s):
         return Envelope(-math.inf, math.inf, 0.0, math.inf)
     return envelope_of(way.pieces, from_s, bounds.mainline_speed_mps)
 
@@ -114,7 +115,7 @@ def surely_apart(
     if min(mine.merge_s, theirs.merge_s) > from_s:
         return False
     start_s = max(from_s, mine.merge_s, theirs.merge_s)
-    if start_s == math.inf:
+    if not (comes_onto_mainline(mine.merge_s) and comes_onto_mainline(theirs.merge_s)):
         return True
     envelope = envelope_of(theirs.pieces, start_s, bounds.mainline_speed_mps)
     if my_envelope.lowest_m >= envelope.highest_m:

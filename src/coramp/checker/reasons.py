@@ -17,7 +17,8 @@
     CHANGES_THE_PAST,
     STARTS_TOO_LATE,
     HOLDS_NEWCOMERS,
-) = range(16)
+    TAKES_NO_COMMANDS,
+) = range(17)
 
 REASONS = (
     "accepted",
@@ -36,6 +37,7 @@ REASONS = (
     "changes a lane change that has happened, or the stream",
     "starts later than the vehicle can act: what it drives until then is missing",
     "may hold up a mainline vehicle that is yet to enter, which its strategy does not declare",
+    "commands a vehicle that takes no commands: a driver, or one that never entered",
 )
 
 JOIN = 1e-6

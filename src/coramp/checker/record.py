@@ -27,10 +27,8 @@ class Record(NamedTuple):
 
     Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. What it can
     do is ``rows[i, :TRAITS]`` (columns of ``distances``). It comes onto the mainline at
-    ``rows[i, MERGE]`` (s; minus infinity for a mainline vehicle, infinity while no merge is
-    commanded) and leaves the zone at ``rows[i, EXIT]`` (s; infinity while it would stop before).
-    ``live`` lists the rows on the
-    road, by entry.
+    ``rows[i, MERGE]`` (``checker.merging``) and leaves the zone at ``rows[i, EXIT]`` (s; infinity
+    while it would stop before). ``live`` lists the rows on the road, by entry.
     """
 
     pieces: FloatArray

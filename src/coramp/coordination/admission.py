@@ -29,6 +29,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     trajectory_under,
 )
+from coramp.vehicles.merge_state import is_on_mainline, is_waiting, merge_time_at_entry_s
 from coramp.vehicles.traits import own_rules, standing_behind_m
 
 LEAST_MOVE_M = 1.0
@@ -114,7 +115,7 @@ def stop_behind_m(fleet: Fleet, traits: FloatArray, rules: Rules) -> float:
     """Returns where the next ramp vehicle must be able to stop: before the nose, or another."""
     stop_m = rules.road.stop_station_m
     for row in fleet.live:
-        if fleet.merge_time_s[row] == math.inf:
+        if is_waiting(fleet.merge_time_s[row]):
             standing_m = standing_behind_m(fleet.traits[row], traits, rules)
             behind_m = stop_of_m(committed(fleet, row)) - fleet.length_m[row] - standing_m
             stop_m = min(stop_m, behind_m)
@@ -149,7 +150,7 @@ def undecided_in_lane_order(fleet: Fleet, time_s: float) -> IntArray:
     stations_m = np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if fleet.merge_time_s[row] == math.inf:
+        if is_waiting(fleet.merge_time_s[row]):
             station_m, _ = station_and_speed(committed(fleet, row), time_s)
             k = n
             while k > 0 and stations_m[k - 1] < station_m:
@@ -172,13 +173,13 @@ def safe_to_enter(
     """Returns whether the entry keeps its distance, the allowance included, from everyone ahead."""
     if len(pieces) == 0:
         return False
-    merge_s = math.inf if on_ramp else -math.inf
+    merge_s = merge_time_at_entry_s(on_ramp)
     far_m = largest_safe_distance_m(rules)
     highest_m = math.inf
     if not on_ramp:
         _, highest_m = intercept_range_m(pieces, time_s, rules.road.mainline_speed_mps)
     for row in fleet.live:
-        if on_ramp and fleet.merge_time_s[row] <= time_s:
+        if on_ramp and is_on_mainline(fleet.merge_time_s[row], time_s):
             continue
         if fleet.intercepts_m[row, 0] - fleet.length_m[row] - highest_m > far_m:
             continue

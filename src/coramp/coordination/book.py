@@ -19,7 +19,8 @@ from coramp.kinematics.trajectory import (
     time_at_station,
 )
 from coramp.vehicles.fleet import Fleet, committed
-from coramp.vehicles.traits import LENGTH, Traits
+from coramp.vehicles.merge_state import NOT_PLANNED_S, has_place_on_mainline
+from coramp.vehicles.traits import Traits
 
 ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
 """Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
@@ -61,7 +62,7 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.zeros(rows, np.int64),
         np.zeros(rows, np.int64),
         np.zeros(rows),
-        np.full(rows, math.inf),
+        np.full(rows, NOT_PLANNED_S),
         np.tile(np.array([-math.inf, math.inf]), (rows, 1)),
         np.zeros((rows, len(Traits._fields))),
         np.full(rows, math.inf),
@@ -183,20 +184,6 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
 
 
 @kernel
-def add_row(book: Book, traits: FloatArray, on_ramp: bool) -> int:
-    """Makes room for a vehicle that is about to enter; returns its row.
-
-    It counts as on the road only with its first commitment.
-    """
-    row = book.used[ROWS]
-    book.length_m[row] = traits[LENGTH]
-    book.traits[row] = traits
-    book.merge_time_s[row] = math.inf if on_ramp else -math.inf
-    book.used[ROWS] += 1
-    return int(row)
-
-
-@kernel
 def write_commitment(
     book: Book,
     row: int,
@@ -220,7 +207,7 @@ def write_commitment(
     way = book.pieces[start : first + count]
     book.merge_time_s[row] = merge_time_s
     book.exit_s[row] = time_at_station(way, zone_end_m)
-    if merge_time_s < math.inf:
+    if has_place_on_mainline(merge_time_s):
         from_s = max(now_s, merge_time_s)
         lowest_m, highest_m = intercept_range_m(way, from_s, cruise_speed_mps)
         book.intercepts_m[row, 0], book.intercepts_m[row, 1] = lowest_m, highest_m

@@ -5,7 +5,7 @@ Driven by the control clock alone. It knows no simulator: a plant carries the ve
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
@@ -23,6 +23,8 @@ from coramp.coordination.admission import (
     undecided_in_lane_order,
 )
 from coramp.coordination.book import ways_of
+from coramp.coordination.commitments import Commitments
+from coramp.coordination.drivers import DriverRoad, sorted_by_taker
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
     DONE,
@@ -34,7 +36,6 @@ from coramp.coordination.gate import (
     admit_until,
     enter,
     entries_of,
-    first_step_from,
     gate_for,
     next_step,
     open_gate,
@@ -47,23 +48,29 @@ from coramp.coordination.plant import Plant
 from coramp.coordination.supervisor import drive_safely
 from coramp.coordination.wakes import PERIOD, Wakes
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.events import DetectorReading
 from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, packed
 from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
+    Command,
     Decider,
     Decision,
+    Detectors,
     DriveWithAcceleration,
     Explanation,
     FollowTrajectory,
     Memory,
     View,
     entry_policy_of,
+    is_metered,
     period_of,
     steps_of_period,
 )
 from coramp.vehicles.fleet import proposed
+from coramp.vehicles.merge_state import has_place_on_mainline
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +104,9 @@ class Coordinator:
     """Runs one strategy over the requests to enter that a world feeds.
 
     The feed is the world's; a request is read when its step has come, and may be there earlier.
-    Without a plant nobody carries the vehicles: the commitments are all there is.
-    ``interventions`` counts what the strategy commanded and the checker refused.
+    Without a plant nobody carries the vehicles: the commitments are all there is. ``drivers`` is
+    what it hears of vehicles that take no commands, if there are any.
+    ``interventions`` counts what the strategy commanded and was refused.
     """
 
     def __init__(
@@ -108,9 +116,10 @@ class Coordinator:
         feed: RequestFeed,
         fastest_entry_mps: float,
         plant: Plant | None = None,
+        drivers: DriverRoad | None = None,
     ) -> None:
         road = rules.road
-        self.ledger = Ledger(road.mainline_speed_mps, road.mainline_end_m, len(feed))
+        self.ledger = Ledger(len(feed))
         self.decisions: list[DecisionRecord] = []
         self.refusals: list[Refusal] = []
         self.interventions = 0
@@ -118,7 +127,8 @@ class Coordinator:
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
-        self._examiner = Examiner(bounds_of(rules), len(feed))
+        examiner = Examiner(bounds_of(rules), len(feed))
+        self._commitments = Commitments(self.ledger, examiner, road)
         self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
@@ -127,6 +137,8 @@ class Coordinator:
         self._fastest_entry_mps = fastest_entry_mps
         self._newcomers = Newcomers(fastest_entry_mps, rules)
         self._plant = plant
+        self._drivers = DriverRoad() if drivers is None else drivers
+        self._detectors: Detectors | None = None
         self._memory: Memory = None
         self._step_s = rules.control.step_s
         self._wakes = Wakes()
@@ -135,9 +147,12 @@ class Coordinator:
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
     def expect_arrivals(self) -> None:
-        """Lets every request be heard at its step, and starts the strategy's own clock, if any."""
+        """Lets every request be heard at its step, and starts the strategy's own clock, if any.
+
+        The clock of a strategy that meters are the readings of the loops.
+        """
         open_gate(self._gate)
-        if self._period_steps:
+        if self._period_steps and not is_metered(self._strategy):
             self._wakes.ask(self._period_steps, PERIOD)
 
     def run(self, last_step: int) -> None:
@@ -153,24 +168,32 @@ class Coordinator:
                 self._plant.advance(step)
             self._handle_wakes(step)
 
+    def read(self, reading: DetectorReading) -> None:
+        """Asks the strategy at the step of a reading of the road's loops, after all else of it."""
+        step = round(reading.time_s / self._step_s)
+        self.run(step)
+        _, *told = astuple(reading)
+        self._detectors = Detectors(*told)
+        self._decide((), step)
+        self._detectors = None
+
     def _admit(self, last_step: int) -> None:
         """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
         self._gate = with_feed(self._gate, self._feed)
         while True:
             stop = admit_until(
                 self.ledger.book,
-                self._examiner.record,
+                self._commitments.examiner.record,
                 self._gate,
                 last_step,
                 self._packed,
-                self._examiner.bounds,
+                self._commitments.examiner.bounds,
             )
             last_step = min(last_step, self._announce_entries())
             if stop.why == DONE:
                 return
             if stop.why == FULL:
-                self.ledger.make_room()
-                self._examiner.make_room()
+                self._commitments.make_room()
             elif stop.why == REFUSED:
                 self._note_refusal(stop.step, len(self.ledger), stop.code)
 
@@ -217,12 +240,15 @@ class Coordinator:
         return sorted(set(range(int(self._gate.feed[HEARD]))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
-        if self._wakes.tick(step, self._period_steps) and len(self.ledger.fleet.live):
+        if self._wakes.tick(step, self._period_steps) and self._has_traffic():
             self._decide((), step)
         while subjects := self._wakes.woken(step):
             ready = self._ready(subjects, step)
             if ready:
                 self._decide(ready, step)
+
+    def _has_traffic(self) -> bool:
+        return bool(len(self.ledger.fleet.live) or len(self._drivers.seen().rows))
 
     def _ready(self, subjects: tuple[int, ...], step: int) -> tuple[int, ...]:
         """Who is to be planned now: all, but for those who can go on to their station first.
@@ -237,24 +263,23 @@ class Coordinator:
 
     def _moves_up_in_time(self, row: int, step: int, before_step: int) -> None:
         """Moves a vehicle up whose stop would begin before a step, if it can."""
-        if self.ledger.merge_time_s(row) < math.inf:
+        if has_place_on_mainline(self.ledger.merge_time_s(row)):
             return
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
 
     def place(self, number: int, station_m: float, step: int) -> bool:
         """Puts who asks to enter on the road, from that station; False where that is not safe."""
-        self.ledger.make_room()
-        self._examiner.make_room()
+        self._commitments.make_room()
         code = enter(
             self.ledger.book,
-            self._examiner.record,
+            self._commitments.examiner.record,
             self._gate,
             number,
             station_m,
             step,
             self._rules,
-            self._examiner.bounds,
+            self._commitments.examiner.bounds,
         )
         if code not in (ACCEPTED, WAITS):
             self._note_refusal(step, len(self.ledger), code)
@@ -265,10 +290,10 @@ class Coordinator:
         self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
-        now_s = step * self._step_s
-        self.ledger.commit(row, pieces, merge_time_s, now_s)
-        self._examiner.note(row, pieces, merge_time_s, now_s)
-        if merge_time_s < math.inf:  # it is planned: nothing is due at its decision station
+        self._commitments.change(row, pieces, merge_time_s, step * self._step_s)
+        if has_place_on_mainline(
+            merge_time_s
+        ):  # it is planned: nothing is due at its decision station
             self._wakes.planned(row)
         self._announce(row, step)
 
@@ -287,7 +312,7 @@ class Coordinator:
     def _moves_up(self, row: int, step: int) -> bool:
         """Whether a vehicle without a merge can go on to a stop further ahead, and now does."""
         time_s = step * self._step_s
-        if self.ledger.merge_time_s(row) < math.inf:
+        if has_place_on_mainline(self.ledger.merge_time_s(row)):
             return False
         from_s = time_s + self._rules.control.actuation_delay_s
         proposal = plan_moving_up(self.ledger.fleet, from_s, self._rules)
@@ -299,7 +324,7 @@ class Coordinator:
         ]
         if not moves or not (self._asks_at_entry or row in [move.row for move in moves]):
             return False
-        verdict = self._examiner.change(moves, time_s, from_s)
+        verdict = self._commitments.examiner.change(moves, time_s, from_s)
         if verdict.code != ACCEPTED:
             self._note_refusal(step, row, verdict.code)
             return False
@@ -321,9 +346,10 @@ class Coordinator:
             self._fastest_entry_mps,
             self._rules,
             self._packed,
-            None,
+            self._detectors,
             partial(entries_of, self._gate, entered, self._step_s),
             partial(waiting_at, self._gate, step, self._step_s),
+            self._drivers.seen,
         )
 
     def _decide(self, subjects: tuple[int, ...], step: int) -> None:
@@ -333,24 +359,15 @@ class Coordinator:
     def carry_out(self, decision: Decision, subjects: tuple[int, ...], step: int) -> None:
         """Commits what a decision commands, or what is safe instead, and notes its wakes."""
         time_s = step * self._step_s
-        drives = [c for c in decision.commands if isinstance(c, DriveWithAcceleration)]
-        if drives:
-            self.drive(drives, step)
         trajectories = [c for c in decision.commands if isinstance(c, FollowTrajectory)]
+        if len(trajectories) < len(decision.commands):
+            self._carry_out_others(decision.commands, step)
         margin_m = math.nan
         if trajectories:
-            earliest_s = time_s + self._rules.control.actuation_delay_s
-            verdict = self._examiner.change(trajectories, time_s, earliest_s)
-            code = verdict.code
-            if (
-                code == ACCEPTED
-                and not (self._holds_newcomers or self._rules.traffic.differs)
-                and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
-            ):
-                code = HOLDS_NEWCOMERS
-            if code != ACCEPTED:
+            verdict = self._verdict_on(trajectories, time_s)
+            if verdict.code != ACCEPTED:
                 self.interventions += 1
-                self._refuse(decision, subjects, step, verdict._replace(code=code))
+                self._refuse(decision, subjects, step, verdict)
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:
@@ -366,15 +383,32 @@ class Coordinator:
             elif wake_step > step:
                 self._moves_up(row, step)
 
+    def _carry_out_others(self, commands: Sequence[Command], step: int) -> None:
+        given = sorted_by_taker(commands)
+        without_signal = sum(not self._drivers.show(signal, step) for signal in given.signals)
+        self.interventions += given.refused + without_signal
+        if given.drives:
+            self.drive(given.drives, step)
+
+    def _verdict_on(self, trajectories: Sequence[FollowTrajectory], time_s: float) -> Verdict:
+        earliest_s = time_s + self._rules.control.actuation_delay_s
+        verdict = self._commitments.examiner.change(trajectories, time_s, earliest_s)
+        if (
+            verdict.code == ACCEPTED
+            and not (self._holds_newcomers or self._rules.traffic.differs)
+            and self._newcomers.are_held_up(self.ledger, trajectories, time_s)
+        ):
+            return verdict._replace(code=HOLDS_NEWCOMERS)
+        return verdict
+
     def drive(self, commands: Sequence[DriveWithAcceleration], step: int) -> int:
         """Carries out what is safe of commanded accelerations; returns how many were refused."""
         carried_out = drive_safely(
-            self.ledger,
+            self._commitments,
             commands,
             step * self._step_s,
             self._fastest_entry_mps,
             self._packed,
-            self._examiner,
         )
         for command, driven in zip(commands, carried_out, strict=True):
             if driven:

@@ -14,6 +14,7 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_to_cover,
 )
+from coramp.vehicles.merge_state import NOT_PLANNED_S
 
 RAMP, ACCELERATION, MAINLINE = 0, 1, 2
 """Codes of the lanes that pieces lie on."""
@@ -30,7 +31,7 @@ def driven_pieces(
     vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose and at the merge.
     """
     book, blocks = ledger.book, ledger.book.used[BLOCKS]
-    merge_s, until_s = np.full(vehicles, np.inf), np.full(vehicles, end_s)
+    merge_s, until_s = np.full(vehicles, NOT_PLANNED_S), np.full(vehicles, end_s)
     merge_s[vehicle_of_row] = book.merge_time_s[: len(ledger)]
     until_s[vehicle_of_row] = np.minimum(end_s, book.exit_s[: len(ledger)])
     of_block = vehicle_of_row[book.block_row[:blocks]]

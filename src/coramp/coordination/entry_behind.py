@@ -1,7 +1,5 @@
 """How a vehicle enters the mainline where vehicles differ: behind one that may stay slower."""
 
-import math
-
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
@@ -16,6 +14,7 @@ from coramp.kinematics.trajectory import (
 from coramp.motion.following import Leader, follow_safely, speed_up
 from coramp.road.rules import Rules
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import BY_MAINLINE_S, is_waiting
 from coramp.vehicles.traits import BRAKING, cruise_mps
 
 
@@ -48,7 +47,7 @@ def entry_behind_others(
         return n
     return follow_safely(
         base[:n],
-        -math.inf,
+        BY_MAINLINE_S,
         time_s + rules.control.actuation_delay_s,
         Leader(committed(fleet, leader), fleet.traits[leader], fleet.merge_time_s[leader]),
         traits,
@@ -66,7 +65,7 @@ def last_on_mainline(fleet: Fleet, time_s: float) -> int:
     """
     last, last_s = -1, time_s
     for row in fleet.live:
-        if fleet.merge_time_s[row] == math.inf:
+        if is_waiting(fleet.merge_time_s[row]):
             continue
         if last < 0:
             last, last_s = row, max(time_s, fleet.merge_time_s[row])

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coramp._kernel import FloatArray, kernel
+from coramp._kernel import kernel
 from coramp.checker.checker import Change, Verdict, examine
 from coramp.checker.distances import Bounds
-from coramp.checker.record import Record, empty_record, note_command, with_room
+from coramp.checker.record import Record, empty_record, with_room
 from coramp.kinematics.trajectory import MAX_PIECES
 from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
@@ -34,10 +34,10 @@ def bounds_of(rules: Rules) -> Bounds:
 
 
 class Examiner:
-    """Lays changes before the checker, and tells it what was commanded.
+    """Lays changes before the checker.
 
-    ``record`` is the checker's own; kernels that let vehicles in write into it. It is replaced as
-    it grows.
+    ``record`` is the checker's own of what was commanded; ``commitments`` writes into it. It is
+    replaced as it grows.
     """
 
     def __init__(self, bounds: Bounds, vehicles: int = 0) -> None:
@@ -73,11 +73,6 @@ class Examiner:
             change.merge_s[k] = command.merge_time_s
             change.makes_gap[k] = command.makes_gap
         return examine_first(self.record, change, len(commands), now_s, earliest_s, self.bounds)
-
-    def note(self, row: int, pieces: FloatArray, merge_s: float, now_s: float) -> None:
-        """Tells the checker of a command that was sent."""
-        self.make_room()
-        note_command(self.record, row, merge_s, pieces, now_s, self.bounds.zone_end_m)
 
 
 @kernel

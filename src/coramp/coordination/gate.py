@@ -11,27 +11,25 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Entry, examine_entry
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED, TOO_NEAR, TOO_NEAR_AT_MERGE
-from coramp.checker.record import Record, has_room, note_entry
+from coramp.checker.record import Record
 from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import (
     BLOCKS,
     LIVE,
     ROWS,
     Book,
-    add_row,
-    is_full,
     strike_exited,
     ways_of,
 )
-from coramp.coordination.book import write_commitment as write
-from coramp.kinematics.trajectory import MAX_PIECES
+from coramp.coordination.commitments import NO_ROOM, commit_entry
 from coramp.messages.feed import RequestFeed
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
 from coramp.vehicles.traits import LENGTH, traits_or_usual
 
 NEVER = 1 << 60
-WAITS = -1
+WAITS, CROWDED = -1, -2
 HEARD, OFFERED, OPEN = range(3)
 """Places in ``Gate.feed``."""
 DONE, FULL, REFUSED = range(3)
@@ -223,16 +221,14 @@ def admit_until(
         _hear(gate, step)
         for stream in range(2):
             while gate.try_step[stream] <= step:
-                if is_full(
-                    book.used, len(book.live), len(book.block_row), len(book.pieces)
-                ) or not has_room(record, MAX_PIECES):
-                    return Stop(FULL, step, -1, ACCEPTED)
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 if _is_as_refused(book, gate, stream, arrival):
                     gate.try_step[stream] = step + 1
                     continue
                 start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
                 code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
+                if code == CROWDED:
+                    return Stop(FULL, step, -1, ACCEPTED)
                 if code == ACCEPTED:
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
@@ -280,7 +276,8 @@ def enter(
 ) -> int:
     """Puts an arrival on the road, harmonised from there, if the checker agrees.
 
-    Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, or the checker's reason.
+    Returns ``ACCEPTED``, ``WAITS`` where no way in is safe, ``CROWDED`` where there is no room to
+    write it down, or the checker's reason.
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     traits, speed_mps = traits_or_usual(gate.traits[arrival], rules), gate.speed_mps[arrival]
@@ -300,18 +297,21 @@ def enter(
     code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
         return code
-    row, road = add_row(book, traits, on_ramp), rules.road
-    note_entry(record, traits, book.merge_time_s[row], pieces, bounds.zone_end_m)
-    merge_s = book.merge_time_s[row]
-    write(book, row, pieces, merge_s, time_s, road.mainline_speed_mps, road.mainline_end_m)
+    road = rules.road
+    row = commit_entry(
+        book,
+        record,
+        traits,
+        on_ramp,
+        pieces,
+        time_s,
+        road.mainline_speed_mps,
+        road.mainline_end_m,
+    )
+    if row == NO_ROOM:
+        return CROWDED
     gate.row_arrival[row], gate.row_step[row] = arrival, step
     if on_ramp:
         due_s = decision_due_s(pieces, road.decision_station_m)
         gate.row_due_step[row] = max(step, first_step_from(due_s, rules.control.step_s))
     return code
-
-
-@kernel
-def first_step_from(time_s: float, step_s: float) -> int:
-    """Returns the first step at or after a time."""
-    return int(np.ceil(time_s / step_s - 1e-6))

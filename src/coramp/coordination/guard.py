@@ -140,6 +140,11 @@ def _told(error: BaseException) -> str:
 
 def _period_checked(strategy: Guardable) -> float | None:
     period_s: Any = period_of(strategy)
+    if period_s is None and is_metered(strategy):
+        raise CorampError(
+            f"strategy {strategy.name}: period_s: is missing, and it sets a signal; allowed is a "
+            f"number from {SHORTEST_PERIOD_S:g} to {LONGEST_PERIOD_S:g}"
+        )
     if period_s is None:
         return None
     if isinstance(period_s, int | float) and SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
@@ -154,16 +159,20 @@ def _wrong_with(decision: Any, view: View) -> str:
     if not isinstance(decision, Decision):
         return f"returns {type(decision).__name__}; allowed is a Decision"
     try:
-        return _wrong_inside(decision, set(view.fleet.live.tolist()), view.time_s)
+        return _wrong_inside(decision, view)
     except (TypeError, ValueError, AttributeError) as error:
         return f"returns what is no decision: {error}"
 
 
-def _wrong_inside(decision: Decision, live: set[int], now_s: float) -> str:
+def _wrong_inside(decision: Decision, view: View) -> str:
+    live = set(view.fleet.live.tolist())
     moved = [command for command in decision.commands if isinstance(command, FollowTrajectory)]
     if len(moved) > MAX_CHANGED:
         return f"commands {len(moved)} trajectories; allowed are {MAX_CHANGED} at a time"
     rows = [command.row for command in decision.commands if hasattr(command, "row")]
+    to_drivers = [row for row in rows if _is_row(row) and row < -1]
+    if to_drivers:  # refused and counted by the loop
+        live.update(view.drivers.rows.tolist())
     named = [*rows, *(row for _, row in decision.wakes_s)]
     named += [explanation.row for explanation in decision.explanations]
     for explanation in decision.explanations:
@@ -174,7 +183,7 @@ def _wrong_inside(decision: Decision, live: set[int], now_s: float) -> str:
     if len(set(rows)) < len(rows):
         return "commands a vehicle twice"
     for wake_s, _ in decision.wakes_s:
-        if not now_s <= wake_s < np.inf:
+        if not view.time_s <= wake_s < np.inf:
             return f"asks to be woken at {wake_s} s; allowed is the present or later"
     try:
         hash(decision.memory)

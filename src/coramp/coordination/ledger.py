@@ -14,7 +14,6 @@ from coramp.coordination.book import (
     empty_book,
     states_of_live,
     with_room,
-    write_commitment,
 )
 from coramp.strategies.base import Reports
 from coramp.vehicles.fleet import Fleet
@@ -29,13 +28,14 @@ class Commitment:
 
 
 class Ledger:
-    """Holds all commitments of a run. ``book`` is for kernels; it is replaced as it grows."""
+    """Holds all commitments of a run. ``book`` is for kernels; it is replaced as it grows.
 
-    def __init__(self, cruise_speed_mps: float, zone_end_m: float, vehicles: int = 0) -> None:
+    Only ``commitments`` writes into it.
+    """
+
+    def __init__(self, vehicles: int = 0) -> None:
         rows = max(16, vehicles)
         self.book: Book = empty_book(rows, 2 * rows, 8 * rows)
-        self._cruise_speed_mps = cruise_speed_mps
-        self._zone_end_m = zone_end_m
 
     def __len__(self) -> int:
         return int(self.book.used[ROWS])
@@ -62,13 +62,6 @@ class Ledger:
         """Makes sure that one more row and so many commitments fit into the book."""
         self.book = with_room(self.book, commitments)
 
-    def commit(self, row: int, pieces: FloatArray, merge_time_s: float, now_s: float) -> None:
-        """Records at ``now_s`` that ``row`` follows ``pieces`` from their first time on."""
-        self.make_room()
-        write_commitment(
-            self.book, row, pieces, merge_time_s, now_s, self._cruise_speed_mps, self._zone_end_m
-        )
-
     def reports(self, time_s: float) -> Reports:
         """Returns what the live vehicles would report of themselves: exactly what they promised."""
         station_m, speed_mps = states_of_live(self.book, time_s)
@@ -81,7 +74,7 @@ class Ledger:
         return float(self.book.exit_s[row])
 
     def merge_time_s(self, row: int) -> float:
-        """Returns the committed merge time (s): infinity for none, -infinity on the mainline."""
+        """Returns the committed merge time (s), as ``vehicles.merge_state`` reads it."""
         return float(self.book.merge_time_s[row])
 
     def length_m(self, row: int) -> float:

@@ -1,6 +1,5 @@
 """Whether a merge stands in the way of a mainline vehicle that is yet to enter."""
 
-import math
 from collections.abc import Sequence
 
 from coramp.coordination.ledger import Ledger
@@ -9,6 +8,7 @@ from coramp.kinematics.trajectory import station_and_speed
 from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
 from coramp.strategies.situation import foremost_unknown_m
+from coramp.vehicles.merge_state import has_place_on_mainline, is_waiting
 
 ROUNDING_M = 1e-6
 
@@ -31,7 +31,8 @@ class Newcomers:
         """
         for command in commands:
             merge_s = command.merge_time_s
-            if merge_s == math.inf or ledger.merge_time_s(command.row) < math.inf:
+            known = has_place_on_mainline(ledger.merge_time_s(command.row))
+            if known or is_waiting(merge_s):
                 continue
             last_s, last_m = command.pieces[-1, :2].tolist()
             station_m = last_m  # plans merge where their last piece begins

@@ -1,55 +1,77 @@
 """A coordinator that is told of events as they happen: ``handle(events, step) -> commands``."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from coramp.coordination.coordinator import Coordinator
+from coramp.coordination.drivers import DriverRoad
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
 from coramp.messages.commands import Command
-from coramp.messages.events import Event, RequestToEnter
+from coramp.messages.events import DetectorReading, Event, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules
-from coramp.strategies.base import Decider
+from coramp.strategies.base import Decider, is_metered
 
 
 class Service:
     """Runs one strategy for a world that grows step by step.
 
     Decisions are those of a run that has all requests beforehand, bit for bit: no request is read
-    before its step. Reports, acknowledgements and readings change nothing while the channel is
-    perfect: vehicles are where they promised to be, and have what they were sent.
+    before its step. Who asked to enter takes commands; its reports and acknowledgements change
+    nothing while the channel is perfect: it is where it promised to be, and has what it was sent.
+    Who reports and never asked to enter is a driver. ``ask_drivers`` has all drivers report where
+    they are, for a strategy that looks at them.
     """
 
-    def __init__(self, strategy: Decider, rules: Rules, fastest_entry_mps: float) -> None:
+    def __init__(
+        self,
+        strategy: Decider,
+        rules: Rules,
+        fastest_entry_mps: float,
+        ask_drivers: Callable[[], Iterable[Report]] | None = None,
+    ) -> None:
         self._feed, self._channel = RequestFeed(), Channel()
-        self._step = -1
+        self._drivers = DriverRoad(is_metered(strategy), ask_drivers)
+        self._step, self._step_s = -1, rules.control.step_s
+        self._asked: set[str] = set()
         self.coordinator = Coordinator(
-            strategy, rules, self._feed, fastest_entry_mps, self._channel
+            strategy, rules, self._feed, fastest_entry_mps, self._channel, self._drivers
         )
         self.coordinator.expect_arrivals()
 
     def handle(self, events: Iterable[Event], step: int) -> tuple[Command, ...]:
         """Returns what is commanded up to and including ``step``, the events being those by then.
 
-        Raises CorampError for a step that has been handled, and for a request of such a step or of
-        one that is yet to come.
+        A reading of the road's loops has the strategy asked at its step. Raises CorampError for a
+        step that has been handled, and for a request or reading of such a step or of one that is
+        yet to come.
         """
         if step <= self._step:
             raise CorampError(f"step {step} has been handled; allowed is {self._step + 1} or later")
+        readings = []
         for event in events:
             if isinstance(event, RequestToEnter):
                 self._hear(event, step)
+            elif isinstance(event, Report) and event.vehicle_id not in self._asked:
+                self._drivers.hear(event)
+            elif isinstance(event, DetectorReading):
+                self._check_time("the road's loops: tell", round(event.time_s / self._step_s), step)
+                readings.append(event)
         self._step = step
+        for reading in readings:
+            self.coordinator.read(reading)
         self.coordinator.run(step)
-        return self._channel.taken()
+        return (*self._channel.taken(), *self._drivers.taken())
 
     def _hear(self, request: RequestToEnter, step: int) -> None:
-        if not self._step < request.step <= step:
-            raise CorampError(
-                f"{request.vehicle_id}: asks to enter at step {request.step}; "
-                f"allowed is {self._step + 1} to {step}"
-            )
+        self._check_time(f"{request.vehicle_id}: asks to enter", request.step, step)
         try:
             self._feed.append(request)
         except ValueError as error:
             raise CorampError(str(error)) from None
+        self._asked.add(request.vehicle_id)
+
+    def _check_time(self, what: str, at_step: int, step: int) -> None:
+        if not self._step < at_step <= step:
+            allowed = f"allowed is {self._step + 1} to {step}"
+            raise CorampError(f"{what} at step {at_step}; {allowed}")

@@ -6,7 +6,6 @@ stops before the nose. What it lets pass is committed. What it refuses is not dr
 keeps its last commitment, which is safe to its end.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,11 +14,9 @@ from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.checker.checker import Change, examine
 from coramp.checker.distances import Bounds
 from coramp.checker.reasons import ACCEPTED
-from coramp.checker.record import Record, note_command
+from coramp.checker.record import Record
 from coramp.coordination.book import Book, fleet_of
-from coramp.coordination.book import write_commitment as write
-from coramp.coordination.examination import Examiner
-from coramp.coordination.ledger import Ledger
+from coramp.coordination.commitments import Commitments, commit_change
 from coramp.equations.safe_distance import merge_clearance_m, standing_clearance_m
 from coramp.kinematics.trajectory import MAX_PIECES, TIME, cruise_intercept_m
 from coramp.motion.approach import stop_of_m
@@ -30,35 +27,34 @@ from coramp.strategies.base import DriveWithAcceleration
 from coramp.strategies.ramp_queue import next_ahead_on_ramp
 from coramp.strategies.situation import foremost_unknown_m
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import NOT_PLANNED_S, is_on_mainline, is_waiting
 
 MOST_PASSES = 3
 """A command that another one stands in the way of is tried again after that."""
 
 
 def drive_safely(
-    ledger: Ledger,
+    commitments: Commitments,
     commands: Sequence[DriveWithAcceleration],
     now_s: float,
     fastest_entry_mps: float,
     packed_rules: FloatArray,
-    examiner: Examiner,
 ) -> list[bool]:
     """Commits what is safe of the commands; returns for each whether it was carried out."""
     rows = np.array([command.row for command in commands], np.int64)
     wishes = np.array([(c.accel_mps2, c.hold_s) for c in commands])
     merges = np.array([command.merge for command in commands], np.bool_)
-    ledger.make_room(len(rows))
-    examiner.make_room(len(rows))
+    commitments.make_room(len(rows))
     done: BoolArray = drive_all(
-        ledger.book,
-        examiner.record,
+        commitments.ledger.book,
+        commitments.examiner.record,
         rows,
         wishes,
         merges,
         now_s,
         fastest_entry_mps,
         packed_rules,
-        examiner.bounds,
+        commitments.examiner.bounds,
     )
     return done.tolist()  # type: ignore[no-any-return]
 
@@ -111,20 +107,20 @@ def _drive_one(
     fleet = fleet_of(book)
     out = np.empty((MAX_PIECES, 4))
     merge_s = fleet.merge_time_s[row]
-    if merge_s <= from_s:
+    if is_on_mainline(merge_s, from_s):
         n = hold_then_cruise(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         return _commit_if_safe(book, record, row, out[:n], merge_s, now_s, rules, bounds)
-    if merge or merge_s < math.inf:
+    if merge or not is_waiting(merge_s):
         n = hold_then_merge(fleet, row, accel_mps2, hold_s, from_s, rules, out)
         if n > 0 and _known_enough(fleet, row, out[:n], known_m, rules):
             change_s = lane_change_s(out[n - 1, TIME], rules.control.step_s)
             if _commit_if_safe(book, record, row, out[:n], change_s, now_s, rules, bounds):
                 return True
-    if merge_s < math.inf:
+    if not is_waiting(merge_s):
         return False
     stop_m = _place_to_stop_m(fleet, row, from_s, rules)
     n = hold_then_stop(fleet, row, accel_mps2, hold_s, from_s, stop_m, rules, out)
-    return _commit_if_safe(book, record, row, out[:n], math.inf, now_s, rules, bounds)
+    return _commit_if_safe(book, record, row, out[:n], NOT_PLANNED_S, now_s, rules, bounds)
 
 
 @kernel
@@ -170,6 +166,6 @@ def _commit_if_safe(
     )
     if examine(record, change, now_s, from_s, bounds).code != ACCEPTED:
         return False
-    note_command(record, row, merge_s, pieces, now_s, bounds.zone_end_m)
-    write(book, row, pieces, merge_s, now_s, road.mainline_speed_mps, road.mainline_end_m)
+    cruise_mps, zone_end_m = road.mainline_speed_mps, road.mainline_end_m
+    commit_change(book, record, row, pieces, merge_s, now_s, cruise_mps, zone_end_m)
     return True

@@ -19,7 +19,7 @@ class Enter:
 class Follow:
     """Follow these pieces from their first time on; commanded at ``step``.
 
-    ``merge_time_s`` is minus infinity for mainline vehicles, infinity while no merge is committed.
+    ``merge_time_s`` is as ``vehicles.merge_state`` reads it.
     """
 
     vehicle_id: str

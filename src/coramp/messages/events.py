@@ -59,20 +59,6 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True)
-class Detection:
-    """A road sensor saw a vehicle, which need not be connected; deviations are standard ones.
-
-    No world gives detections yet: all vehicles report themselves.
-    """
-
-    time_s: float
-    station_m: float
-    speed_mps: float
-    station_std_m: float
-    speed_std_mps: float
-
-
-@dataclass(frozen=True, slots=True)
 class Acknowledgement:
     """A vehicle has the command that was given at ``commanded_s``."""
 
@@ -91,4 +77,4 @@ class DetectorReading:
     passed_veh: int
 
 
-Event = RequestToEnter | Report | Detection | Acknowledgement | DetectorReading
+Event = RequestToEnter | Report | Acknowledgement | DetectorReading

@@ -13,6 +13,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.road.streams import STREAMS
+from coramp.vehicles.merge_state import is_planned
 from coramp.vehicles.traits import Traits
 
 LOG_VERSION = 2
@@ -193,7 +194,7 @@ def _command(command: Command, step_s: float) -> list[dict[str, Any]]:
         "kind": ENTRY if isinstance(command, Enter) else COMMAND,
         "time_s": time_s,
         "vehicle_id": command.vehicle_id,
-        "merge_time_s": merge_s if np.isfinite(merge_s) else None,
+        "merge_time_s": merge_s if is_planned(merge_s) else None,
         **dict(zip(PIECES, command.pieces.T.tolist(), strict=True)),
     }
     answer = {

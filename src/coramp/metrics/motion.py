@@ -7,6 +7,7 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.kinematics.fuel import trajectory_fuel_l
 from coramp.kinematics.trajectory import ACCEL, SPEED, TIME, piece_end_s, time_at_station
+from coramp.vehicles.merge_state import came_by_mainline
 
 BIN_S = 1.0
 JERK_S = 1.0
@@ -121,14 +122,14 @@ def stopped_vehicles(
 ) -> int:
     """Returns how many vehicles were below 0.1 m/s between entry and merge.
 
-    ``merge_s`` is minus infinity for mainline vehicles, which count until they pass
+    ``merge_s`` is as in ``vehicles.merge_state`` for mainline vehicles, which count until they pass
     ``lane_end_m``, and nan for who never merged, which counts up to ``until_s``.
     """
     found = 0
     for i in range(len(until_s)):
         own = rows[first[i] : first[i + 1]]
         last_s = until_s[i]
-        if merge_s[i] == -math.inf:
+        if came_by_mainline(merge_s[i]):
             last_s = min(last_s, time_at_station(own, lane_end_m))
         elif merge_s[i] < last_s:
             last_s = merge_s[i]

@@ -406,7 +406,12 @@ def _decision_figures(outcome: Outcome) -> Row:
     """How many ramp vehicles each rung served (hold: how many waited), how many others moved."""
     if not outcome.cooperative:
         rungs = {f"rung_{rung}": None for rung in RUNGS}
-        return {"adjusted_vehicles": None, **rungs, "refused_plans": None, "interventions": None}
+        return {
+            "adjusted_vehicles": None,
+            **rungs,
+            "refused_plans": None,
+            "interventions": outcome.interventions or None,
+        }
     served: dict[str, set[int]] = {rung: set() for rung in RUNGS}
     adjusted: set[int] = set()
     for decision in outcome.decisions:

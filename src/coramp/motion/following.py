@@ -35,7 +35,7 @@ LEAST_SPEED_MPS = 0.5
 class Leader(NamedTuple):
     """The vehicle ahead: what it drives, what it can do, and when it merges (s).
 
-    The merge time is minus infinity for a vehicle of the mainline.
+    The merge time is as ``vehicles.merge_state`` reads it.
     """
 
     pieces: FloatArray
@@ -113,8 +113,8 @@ def follow_safely(
     """Writes what disturbs a vehicle least that is on its way by ``base`` and keeps its distance.
 
     That is ``base`` itself, or it braked for the leader as late as is safe, from ``brake_from_s``
-    at the earliest, or as early as that and with the least dip of up to ``most_dip_mps``. Merge
-    times are minus infinity on the mainline. Returns 0 where nothing of that is safe.
+    at the earliest, or as early as that and with the least dip of up to ``most_dip_mps``. Returns
+    0 where nothing of that is safe.
     """
     from_s = base[0, TIME]
     if _is_safe(base, traits, merge_s, leader, from_s, rules):

@@ -5,10 +5,9 @@ from typing import TypeVar
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
+from coramp.motion.clock import ON_GRID
 
 Time = TypeVar("Time", float, FloatArray)
-ON_GRID = 1e-6
-"""Share of a step within which a time counts as lying on it."""
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import DecisionRecord, Refusal
 from coramp.messages.log import Told
+from coramp.records.lanes import LaneHistory
 from coramp.vehicles.traits import Traits
 
 LANES = ("ramp", "acceleration", "mainline")
@@ -17,10 +18,11 @@ LANES = ("ramp", "acceleration", "mainline")
 class Passages:
     """One entry a vehicle, in the order of scheduled times; nan where something never happened.
 
-    ``merge_s`` is when a ramp vehicle changed to the mainline, minus infinity for mainline
-    vehicles. ``entry_speed_mps`` is the scheduled one. ``plan_error_m`` is the largest distance
-    seen between plan and simulator, nan without a plan. ``traits`` are None for vehicles that only
-    the common limits bind; types and traits may be left out where that is so for all.
+    ``merge_s`` is when a ramp vehicle changed to the mainline, ``BY_MAINLINE_S`` of
+    ``vehicles.merge_state`` for mainline vehicles. ``entry_speed_mps`` is the scheduled one.
+    ``plan_error_m`` is the largest distance seen between plan and simulator, nan without a plan.
+    ``traits`` are None for vehicles that only the common limits bind; types and traits may be left
+    out where that is so for all.
     """
 
     vehicle_id: tuple[str, ...]
@@ -56,10 +58,10 @@ class Outcome:
     """Everything that an engine hands to the metrics.
 
     ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
-    simulator made of it; for its own drivers both are its steps. ``driven_lane`` has a code for
-    each driven piece where the simulator's positions were read. ``end_s`` is when the run ended or
-    was cut off. Decisions name vehicles by rows of the ledger; ``vehicle_of_row`` gives their
-    places in ``passages``. ``told`` are the messages, where they were to be kept.
+    simulator made of it; for its own drivers both are its steps. ``lanes`` is who was on which lane
+    when, as driven. ``end_s`` is when the run ended or was cut off. Decisions name vehicles by rows
+    of the ledger; ``vehicle_of_row`` gives their places in ``passages``. ``told`` are the messages,
+    where they were to be kept.
     """
 
     cooperative: bool
@@ -67,16 +69,21 @@ class Outcome:
     pieces: Pieces
     lane: IntArray
     driven: Pieces
+    lanes: LaneHistory
     end_s: float
     collisions: int
     decisions: tuple[DecisionRecord, ...] = ()
     refusals: tuple[Refusal, ...] = ()
     interventions: int = 0
-    driven_lane: IntArray | None = None
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     told: Told | None = None
 
     @property
     def until_s(self) -> FloatArray:
         """When each vehicle left, or the run ended without it."""
-        return np.where(np.isnan(self.passages.exit_s), self.end_s, self.passages.exit_s)
+        return until_s(self.passages.exit_s, self.end_s)
+
+
+def until_s(exit_s: FloatArray, end_s: float) -> FloatArray:
+    """Returns when each vehicle leaves (nan: never), or the run ends without it."""
+    return np.where(np.isnan(exit_s), end_s, exit_s)

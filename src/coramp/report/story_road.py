@@ -1,6 +1,5 @@
 """The road from above at one decision: the vehicles, the gap, and the place that it leaves."""
 
-import math
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -18,6 +17,7 @@ from coramp.report.story_scene import (
     Scene,
 )
 from coramp.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION, YELLOW
+from coramp.vehicles.merge_state import came_by_mainline, is_on_mainline
 
 MOVED_LINE = (0, (6, 1, 1, 1, 1, 1))
 LOOKS = {
@@ -44,13 +44,13 @@ def look_in(scene: Scene, name: str) -> tuple[str, object, float]:
     """Returns colour, line and width (pt) of a vehicle."""
     if name in scene.roles:
         return LOOKS[scene.roles[name][0]]
-    return OTHERS[scene.driven[name].merge_s == -math.inf][1], "-", 0.8
+    return OTHERS[came_by_mainline(scene.driven[name].merge_s)][1], "-", 0.8
 
 
 def label_in(scene: Scene, name: str) -> str:
     """Returns what the legend calls a vehicle."""
     if name not in scene.roles:
-        return OTHERS[scene.driven[name].merge_s == -math.inf][0]
+        return OTHERS[came_by_mainline(scene.driven[name].merge_s)][0]
     roles = scene.roles[name]
     return roles[0] if roles in ((MOVED,), (BRAKED,)) else f"{name}, {', '.join(roles)}"
 
@@ -72,7 +72,7 @@ def draw_road(axes: Axes, scene: Scene) -> None:
     there = [name for name, driven in scene.driven.items() if driven.present(now_s)]
     named_m: dict[tuple[bool, int], list[float]] = {}
     for name in sorted(there, key=lambda name: name not in scene.roles):
-        on_mainline = now_s >= scene.driven[name].merge_s
+        on_mainline = is_on_mainline(scene.driven[name].merge_s, now_s)
         station_m = scene.driven[name].station_m(now_s)
         if low_m + 5.0 <= station_m <= high_m - 5.0:
             across = 0.0 if on_mainline else -1.0 + slope * min(0.0, station_m)

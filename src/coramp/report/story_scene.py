@@ -16,6 +16,7 @@ from coramp.records.run import RunRecords, moved_for
 from coramp.records.schemas import Row
 from coramp.report.plan_figure import COLUMNS
 from coramp.scenarios.model import Scenario
+from coramp.vehicles.merge_state import BY_MAINLINE_S, NOT_PLANNED_S, is_on_mainline
 
 BEFORE_S, AFTER_S, WITHOUT_MERGE_S = 3.0, 4.0, 20.0
 """How long before a decision and after its merge is shown, and how long if there is no merge."""
@@ -28,8 +29,7 @@ AHEAD, BEHIND = "leaves before it", "leaves after it"
 class Driven:
     """What a vehicle drove: pieces as in ``kinematics.trajectory``, from its entry to its exit.
 
-    On the mainline it is from ``merge_s`` on: minus infinity for mainline vehicles, infinity for
-    ramp vehicles that never merged.
+    On the mainline it is from ``merge_s`` on, which ``vehicles.merge_state`` reads.
     """
 
     pieces: FloatArray
@@ -156,9 +156,9 @@ def driven_of(trajectories: pl.DataFrame, vehicles: pl.DataFrame) -> dict[str, D
 def _merge_s(pieces: pl.DataFrame) -> float:
     lanes = pieces["lane"].to_list()
     if "mainline" not in lanes:
-        return math.inf
+        return NOT_PLANNED_S
     first = lanes.index("mainline")
-    return float(pieces["time_s"][first]) if first else -math.inf
+    return float(pieces["time_s"][first]) if first else BY_MAINLINE_S
 
 
 def _decision_of(decisions: pl.DataFrame, vehicle_id: str) -> Row | None:
@@ -200,6 +200,6 @@ def _passage(run: RunRecords, vehicle_id: str, driven: Mapping[str, Driven]) -> 
 def lateral(scene: Scene, name: str, time_s: float, ramp_slope: float) -> float:
     """Returns across which lane a vehicle is: 0 on the mainline, -1 beside it, less up the ramp."""
     driven = scene.driven[name]
-    if time_s >= driven.merge_s:
+    if is_on_mainline(driven.merge_s, time_s):
         return 0.0
     return -1.0 + ramp_slope * min(0.0, driven.station_m(time_s))

@@ -10,6 +10,7 @@ from coramp.records.run import RunRecords
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
 from coramp.report.style import YELLOW, grid, legend_below, new_figure
+from coramp.vehicles.merge_state import came_by_mainline
 
 WINDOW_S = 120.0
 """How long the window is where its end is not given."""
@@ -87,7 +88,7 @@ def _merges(run: RunRecords) -> pl.DataFrame:
 
 def _look(driven: Driven, moved: bool) -> tuple[str, str, float]:
     """A vehicle's colour, name in the legend and width (pt), as in diagrams of plans."""
-    if driven.merge_s > -math.inf:
+    if not came_by_mainline(driven.merge_s):
         return RAMP_COLOUR, "ramp vehicle", 1.2
     if moved:
         return MOVED_COLOUR, "moves aside", 1.0

@@ -17,7 +17,7 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
-from coramp.runs.unserved import unserved_line
+from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import overrides_in_mps
@@ -241,6 +241,8 @@ def recorded(
             notice(warning)
     tables, row = execute(spec, options)
     if (line := unserved_line(tables.outcome)) is not None:
+        notice(line)
+    if (line := unheeded_line(tables.outcome)) is not None:
         notice(line)
     return RunRecords(run_content(spec, row), row, **tables.frames())
 

@@ -1,4 +1,4 @@
-"""Says who did not get through in a run, and why."""
+"""Says who did not get through in a run, and why, and what drivers were commanded."""
 
 from collections import Counter
 
@@ -25,3 +25,13 @@ def unserved_line(outcome: Outcome) -> str | None:
         return line
     [(reason, _)] = Counter(refusal.reason for refusal in outcome.refusals).most_common(1)
     return f"{line}; plans refused: {len(outcome.refusals)}, most often: {reason}"
+
+
+def unheeded_line(outcome: Outcome) -> str | None:
+    """Returns in a line how many commands nobody could carry out in a run of drivers, or None."""
+    if outcome.cooperative or not outcome.interventions:
+        return None
+    return (
+        f"{outcome.interventions} commands were refused: drivers take none; allowed is to set the "
+        "ramp's signal, where the strategy is metered"
+    )

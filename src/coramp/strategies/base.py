@@ -32,6 +32,22 @@ class Reports:
 
 
 @dataclass(frozen=True, slots=True)
+class Drivers:
+    """Vehicles that report where they are and take no commands, one entry each.
+
+    A driver's row is below -1 and stays its own. Commands to it are refused and counted.
+    """
+
+    rows: IntArray
+    reports: Reports
+
+
+NO_DRIVERS = Drivers(
+    np.empty(0, np.int64), Reports(np.empty(0), np.empty(0), np.empty(0), np.empty(0))
+)
+
+
+@dataclass(frozen=True, slots=True)
 class Detectors:
     """What the road's loop detectors tell of the time since they were last asked.
 
@@ -89,7 +105,9 @@ class View:
     ``reports``; ``ask_entered`` who has entered since the strategy was last asked, for ``entered``;
     ``ask_waiting`` who waits outside, for ``waiting``. ``packed_rules`` are the rules as kernels
     take them (``road.rules``).
-    ``detectors`` is None where the road has none. A strategy must not write into any of the arrays.
+    ``detectors`` is what the road's loops have just told, None where they told nothing.
+    ``ask_drivers`` has the vehicles that take no commands report, for ``drivers``. A strategy must
+    not write into any of the arrays.
     """
 
     time_s: float
@@ -103,6 +121,7 @@ class View:
     detectors: Detectors | None = None
     ask_entered: Callable[[], tuple[Entered, ...]] = tuple
     ask_waiting: Callable[[], Waiting] = lambda: NOBODY_WAITS
+    ask_drivers: Callable[[], Drivers] = lambda: NO_DRIVERS
 
     @cached_property
     def reports(self) -> Reports:
@@ -113,6 +132,11 @@ class View:
     def entered(self) -> tuple[Entered, ...]:
         """Who has entered since the strategy was last asked, in order of entry."""
         return self.ask_entered()
+
+    @cached_property
+    def drivers(self) -> Drivers:
+        """Who drives on the road and takes no commands, as last reported."""
+        return self.ask_drivers()
 
     @cached_property
     def waiting(self) -> Waiting:
@@ -208,7 +232,9 @@ Memory = Hashable
 class Decision:
     """A strategy's answer: commands, wake-up calls, its memory.
 
-    Trajectories of one decision stand or fall together.
+    Trajectories of one decision stand or fall together. What nobody can carry out is refused and
+    counted: a command to a driver, a release of a vehicle that has no driver, a colour where there
+    is no signal.
 
     A wake is a pair of time (s) and row.
     """

@@ -23,6 +23,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     proposed,
 )
+from coramp.vehicles.merge_state import is_on_mainline
 from coramp.vehicles.trace import (
     FOLLOWERS_CANNOT_BRAKE,
     GAP_TOO_SMALL,
@@ -180,7 +181,7 @@ def too_near_ahead(
     row = situation.subject
     for place in range(gap - 1, -1, -1):
         other = situation.order[place]
-        if place < gap - 1 and fleet.merge_time_s[other] <= situation.from_s:
+        if place < gap - 1 and is_on_mainline(fleet.merge_time_s[other], situation.from_s):
             continue
         margin_m = pair_margin_m(
             proposed(proposal, 0),

@@ -10,6 +10,7 @@ from coramp.equations.ramp_acceleration import lag_m
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.road.rules import Rules, unpacked
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import is_on_mainline
 
 RAMP, LANE, MAINLINE = range(3)
 """Stages of a vehicle: before the nose, on the acceleration lane, on the mainline."""
@@ -77,7 +78,7 @@ def _road_users(
     numbers = np.empty((len(fleet.live), 5))
     n = 0
     for row in fleet.live:
-        if (fleet.merge_time_s[row] <= at_s) != merged:
+        if is_on_mainline(fleet.merge_time_s[row], at_s) != merged:
             continue
         station_m, speed_mps = station_and_speed(committed(fleet, row), at_s)
         k = n

@@ -32,6 +32,7 @@ from coramp.vehicles.fleet import (
     proposed,
     trajectory_under,
 )
+from coramp.vehicles.merge_state import has_place_on_mainline
 from coramp.vehicles.trace import (
     SHIFT_TOO_FAR,
     SHIFT_TOO_FAST,
@@ -226,7 +227,7 @@ def find_unsafe_pair(
         one = proposed(proposal, entry)
         one_merge_s = proposal.merge_time_s[entry]
         low_m, high_m = -math.inf, math.inf
-        if not (math.isinf(one_merge_s) and one_merge_s > 0.0):
+        if has_place_on_mainline(one_merge_s):
             low_m, high_m = intercept_range_m(one, max(from_s, one_merge_s), v0)
         for other_row in fleet.live:
             other_entry = place_among(proposal.rows, proposal.size[0], other_row)

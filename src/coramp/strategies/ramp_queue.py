@@ -21,6 +21,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     trajectory_under,
 )
+from coramp.vehicles.merge_state import NOT_PLANNED_S, is_on_mainline, is_waiting
 from coramp.vehicles.traits import own_rules
 
 
@@ -103,7 +104,7 @@ def _add_stop(proposal: Proposal, row: int, n: int) -> None:
     entry = proposal.size[0]
     proposal.rows[entry] = row
     proposal.piece_count[entry] = n
-    proposal.merge_time_s[entry] = math.inf
+    proposal.merge_time_s[entry] = NOT_PLANNED_S
     proposal.size[0] = entry + 1
 
 
@@ -136,7 +137,9 @@ def _safe_on_ramp(
     own_m, _ = station_and_speed(pieces, from_s)
     for other in fleet.live:
         merge_s = merge_time_under_s(fleet, proposal, other)
-        if merge_s <= from_s or (math.isinf(merge_s) and other != leader) or other == row:
+        if is_on_mainline(merge_s, from_s) or other == row:
+            continue
+        if is_waiting(merge_s) and other != leader:
             continue
         ahead = trajectory_under(fleet, proposal, other)
         if station_and_speed(ahead, from_s)[0] < own_m:
@@ -147,7 +150,7 @@ def _safe_on_ramp(
             merge_s,
             pieces,
             fleet.traits[row],
-            math.inf,
+            NOT_PLANNED_S,
             from_s,
             rules,
         )
@@ -162,7 +165,7 @@ def next_behind_on_ramp(fleet: Fleet, leader: int, from_s: float) -> int:
     leader_m, _ = station_and_speed(committed(fleet, leader), from_s)
     found, found_m = -1, -math.inf
     for row in fleet.live:
-        if row != leader and fleet.merge_time_s[row] == math.inf:
+        if row != leader and is_waiting(fleet.merge_time_s[row]):
             row_m, _ = station_and_speed(committed(fleet, row), from_s)
             if found_m < row_m < leader_m:
                 found, found_m = row, row_m
@@ -175,7 +178,7 @@ def next_ahead_on_ramp(fleet: Fleet, row: int, from_s: float) -> int:
     own_m, _ = station_and_speed(committed(fleet, row), from_s)
     found, found_m = -1, math.inf
     for other in fleet.live:
-        if other != row and fleet.merge_time_s[other] == math.inf:
+        if other != row and is_waiting(fleet.merge_time_s[other]):
             other_m, _ = station_and_speed(committed(fleet, other), from_s)
             if own_m < other_m < found_m:
                 found, found_m = other, other_m

@@ -21,6 +21,7 @@ from coramp.motion.approach import approach_without_stop
 from coramp.road.rules import Rules
 from coramp.strategies.ramp_queue import next_behind_on_ramp
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import has_place_on_mainline, is_waiting
 
 RUNG_FREE, RUNG_REACH, RUNG_CREATE, RUNG_DELAY, RUNG_HOLD = range(5)
 RUNGS = ("free", "reach", "create", "delay", "hold")
@@ -91,7 +92,7 @@ def ramp_neighbours(fleet: Fleet, subject: int, from_s: float) -> tuple[bool, in
     own_m, _ = station_and_speed(committed(fleet, subject), from_s)
     blocked = False
     for row in fleet.live:
-        if row != subject and fleet.merge_time_s[row] == math.inf:
+        if row != subject and is_waiting(fleet.merge_time_s[row]):
             other_m, _ = station_and_speed(committed(fleet, row), from_s)
             blocked = blocked or other_m > own_m
     return blocked, next_behind_on_ramp(fleet, subject, from_s)
@@ -104,7 +105,7 @@ def lane_order(fleet: Fleet, subject: int, v0_mps: float) -> tuple[IntArray, Flo
     intercepts_m = np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if row != subject and fleet.merge_time_s[row] < math.inf:
+        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]):
             value_m = cruise_intercept_m(committed(fleet, row), v0_mps)
             k = n
             while k > 0 and intercepts_m[k - 1] < value_m:

@@ -27,6 +27,7 @@ from coramp.motion.slow_phase import least_effort_way, slow_phase
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.proposals import find_unsafe_pair
 from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
+from coramp.vehicles.merge_state import BY_MAINLINE_S, is_on_mainline, is_waiting
 
 SLOWEST_SHARE = 0.5
 """Of v0: what a slower cruise on the mainline does not go below."""
@@ -122,12 +123,14 @@ def slot_behind_m(
     merging_m = max(following_m, merge_clearance_m(rules.road, rules.safety))
     slot_m, leader, leader_m = math.inf, -1, math.inf
     for other in fleet.live:
-        if other == row or fleet.merge_time_s[other] == math.inf:
+        if other == row or is_waiting(fleet.merge_time_s[other]):
             continue
         other_m = cruise_intercept_m(committed(fleet, other), v0)
         if other_m < entry_m:
             continue
-        clearance_m = merging_m if fleet.merge_time_s[other] > from_s else following_m
+        clearance_m = following_m
+        if not is_on_mainline(fleet.merge_time_s[other], from_s):
+            clearance_m = merging_m
         slot_m = min(slot_m, other_m - fleet.length_m[other] - clearance_m)
         if other_m < leader_m:
             leader, leader_m = other, other_m
@@ -224,7 +227,7 @@ def is_safe(
 ) -> bool:
     """Makes the pieces in the first entry those of a mainline vehicle; returns if all is safe."""
     proposal.size[0], proposal.rows[0], proposal.piece_count[0] = 1, row, n
-    proposal.merge_time_s[0] = -math.inf
+    proposal.merge_time_s[0] = BY_MAINLINE_S
     unsafe, _ = find_unsafe_pair(fleet, proposal, from_s, rules)
     return bool(unsafe < 0)
 

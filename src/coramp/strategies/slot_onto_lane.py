@@ -42,6 +42,7 @@ from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
 from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
 from coramp.strategies.slot_pushing import fall_back_behind
 from coramp.vehicles.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
+from coramp.vehicles.merge_state import is_yet_to_merge
 from coramp.vehicles.trace import (
     AHEAD_OF_REACH,
     CANNOT_FALL_BACK,
@@ -351,7 +352,7 @@ def leader_regains_s(fleet: Fleet, situation: Situation, rules: Rules) -> float:
     own_m, _ = station_and_speed(committed(fleet, situation.subject), situation.from_s)
     found, found_m = -1, math.inf
     for row in fleet.live:
-        if situation.from_s < fleet.merge_time_s[row] < math.inf:
+        if is_yet_to_merge(fleet.merge_time_s[row], situation.from_s):
             row_m, _ = station_and_speed(committed(fleet, row), situation.from_s)
             if own_m < row_m < found_m:
                 found, found_m = row, row_m

@@ -22,6 +22,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     trajectory_under,
 )
+from coramp.vehicles.merge_state import is_on_mainline
 
 SETBACKS_M = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0)
 """How far behind its place a vehicle that falls back is tried."""
@@ -53,7 +54,7 @@ def fall_back_behind(
         if math.isnan(ahead_m):
             return False
         ahead, clearance_m = row, following_clearance_m(rules.road, rules.safety)
-        if fleet.merge_time_s[row] > situation.from_s:
+        if not is_on_mainline(fleet.merge_time_s[row], situation.from_s):
             clearance_m = situation.clearance_m
     return True
 
@@ -69,7 +70,7 @@ def fall_back(
     rules: Rules,
 ) -> float:
     """Adds a mainline vehicle that falls back to an intercept; returns that (m), nan for none."""
-    if is_full(proposal) or fleet.merge_time_s[row] > from_s:
+    if is_full(proposal) or not is_on_mainline(fleet.merge_time_s[row], from_s):
         return math.nan
     entry, v0 = proposal.size[0], rules.road.mainline_speed_mps
     out, before = proposal.pieces[entry], committed(fleet, row)

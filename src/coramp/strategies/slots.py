@@ -23,6 +23,12 @@ from coramp.strategies.parameters import choice, parameter
 from coramp.strategies.situation import RUNG_HOLD
 from coramp.strategies.slot_in_lane import Manner, plan_in_lane
 from coramp.strategies.slot_onto_lane import crossing_of_s, plan_onto_lane
+from coramp.vehicles.merge_state import (
+    BY_MAINLINE_S,
+    came_by_mainline,
+    has_place_on_mainline,
+    is_waiting,
+)
 
 ON_TIME_S = 1e-6
 SHARED = ("first-come", "least-delay")
@@ -93,9 +99,9 @@ class Slots:
         row = first_to_plan(view)
         rest = tuple((view.time_s, other) for other in view.subjects if other != row)
         merge_s = float(view.fleet.merge_time_s[row])
-        if merge_s == -math.inf:
+        if came_by_mainline(merge_s):
             decision = self._in_lane(view, row, claims)
-        elif merge_s == math.inf:
+        elif is_waiting(merge_s):
             decision = self._onto_lane(view, row, claims)
         else:
             decision = Decision((), (), claims)
@@ -105,7 +111,7 @@ class Slots:
         """The slot of a mainline vehicle; then the first ramp vehicle that waits is asked about."""
         manner = Manner(self.clear_entrance, self._most_jerk)
         pieces = plan_in_lane(view.fleet, row, view.time_s, manner, view.packed_rules)
-        commands = (FollowTrajectory(row, pieces, -math.inf),) if len(pieces) else ()
+        commands = (FollowTrajectory(row, pieces, BY_MAINLINE_S),) if len(pieces) else ()
         head = tuple((view.time_s, claim.row) for claim in claims[:1] if claim.waits)
         return Decision(commands, head, claims)
 
@@ -139,7 +145,7 @@ class Slots:
                 int(proposal.rows[k]),
                 proposal.pieces[k, : proposal.piece_count[k]].copy(),
                 float(proposal.merge_time_s[k]),
-                makes_gap=bool(view.fleet.merge_time_s[proposal.rows[k]] < math.inf),
+                makes_gap=has_place_on_mainline(view.fleet.merge_time_s[proposal.rows[k]]),
             )
             for k in range(int(proposal.size[0]))
         )

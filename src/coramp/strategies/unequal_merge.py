@@ -19,8 +19,9 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_at_station,
 )
+from coramp.motion.clock import ON_GRID
 from coramp.motion.following import Leader, follow_safely, speed_up
-from coramp.motion.lane_change import ON_GRID, lane_change_s
+from coramp.motion.lane_change import lane_change_s
 from coramp.road.rules import Rules
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.proposals import find_unsafe_pair
@@ -34,6 +35,7 @@ from coramp.vehicles.fleet import (
     pair_margin_m,
     proposed,
 )
+from coramp.vehicles.merge_state import has_place_on_mainline
 from coramp.vehicles.trace import (
     BEFORE_THE_NOSE,
     CANNOT_FALL_BACK,
@@ -83,7 +85,7 @@ def rows_on_mainline(fleet: Fleet, subject: int, at_s: float) -> IntArray:
     rows, behind_m = np.empty(len(fleet.live), np.int64), np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if row != subject and fleet.merge_time_s[row] < math.inf:
+        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]):
             station_m, _ = station_and_speed(committed(fleet, row), at_s)
             rows[n], behind_m[n] = row, -station_m
             n += 1

@@ -10,6 +10,7 @@ from coramp.road.rules import Rules
 from coramp.strategies.situation import RUNG_HOLD, MergePlan
 from coramp.strategies.unequal_merge import UnequalMerge
 from coramp.vehicles.fleet import Fleet, Proposal, committed, trajectory_under
+from coramp.vehicles.merge_state import has_place_on_mainline
 from coramp.vehicles.traits import LENGTH, MASS, pair_safety
 
 
@@ -123,7 +124,7 @@ def _largest_shift_m(fleet: Fleet, proposal: Proposal, merge: UnequalMerge) -> f
     largest_m = 0.0
     for entry in range(1, proposal.size[0]):
         row = proposal.rows[entry]
-        if fleet.merge_time_s[row] < math.inf:
+        if has_place_on_mainline(fleet.merge_time_s[row]):
             was_m, _ = station_and_speed(committed(fleet, row), merge.time_s)
             now_m, _ = station_and_speed(trajectory_under(fleet, proposal, row), merge.time_s)
             largest_m = max(largest_m, was_m - now_m)

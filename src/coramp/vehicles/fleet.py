@@ -9,6 +9,7 @@ from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
 from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
 from coramp.road.rules import Road, Rules, SafetyBudget
+from coramp.vehicles.merge_state import is_waiting
 from coramp.vehicles.separation import smallest_margin_m
 from coramp.vehicles.trace import empty_trace
 from coramp.vehicles.traits import LENGTH, pair_safety
@@ -18,10 +19,9 @@ class Fleet(NamedTuple):
     """All commitments. A vehicle is a row; ``live`` lists the rows now on the road, by entry.
 
     Row i's trajectory is ``pieces[first_piece[i] : first_piece[i] + piece_count[i]]``.
-    ``merge_time_s`` is minus infinity for mainline vehicles, infinity for a ramp vehicle whose
-    merge is not committed. ``traits`` are rows of
-    ``vehicles.traits``. ``intercepts_m[i]`` bound ``station - v0 t``, below and above, over the
-    trajectory.
+    ``merge_time_s`` tells when a vehicle comes onto the mainline, as ``vehicles.merge_state`` reads
+    it. ``traits`` are rows of ``vehicles.traits``. ``intercepts_m[i]`` bound ``station - v0 t``,
+    below and above, over the trajectory.
     """
 
     pieces: FloatArray
@@ -203,7 +203,7 @@ def pair_margin_m(
         smallest_m = ordered_margin_m(
             one, one_length_m, other, other_length_m, from_s, first_merge_s, road, safety
         )
-    if math.isinf(last_merge_s) and last_merge_s > 0.0:
+    if is_waiting(last_merge_s):
         return smallest_m
     together_s = max(from_s, last_merge_s)
     on_mainline_m = ordered_margin_m(

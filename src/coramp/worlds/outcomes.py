@@ -11,7 +11,8 @@ from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
 from coramp.messages.events import columns_of
 from coramp.motion.lane_change import lane_change_s
-from coramp.records.outcome import Outcome, Passages, Pieces
+from coramp.records.lanes import planned_history
+from coramp.records.outcome import Outcome, Passages, Pieces, until_s
 from coramp.scenarios.model import Scenario
 
 NEVER = 1 << 60
@@ -63,12 +64,15 @@ def cooperative_outcome(
     exit_s[exit_s > end_s] = np.nan
     first, lane, rows = driven_pieces(ledger, vehicle_of_row, len(arrivals), end_s)
     planned = Pieces(first, rows)
+    passages = passages_of(arrivals, step_s, entry_s, merge_s, exit_s, error_m)
+    left_s = until_s(exit_s, end_s)
     return Outcome(
         cooperative=True,
-        passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, error_m),
+        passages=passages,
         pieces=planned,
         lane=lane,
         driven=driven or planned,
+        lanes=planned_history(passages.on_ramp, entry_s, merge_s, left_s),
         end_s=end_s,
         collisions=collisions,
         decisions=tuple(coordinator.decisions),

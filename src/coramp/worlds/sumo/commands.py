@@ -13,11 +13,10 @@ import numpy as np
 
 from coramp._kernel import FloatArray, kernel
 from coramp.kinematics.trajectory import ACCEL, SPEED, piece_at, piece_end_s, station_and_speed
+from coramp.motion.clock import ON_GRID
 
 ROUNDING_MPS = 1e-9
 """By so much rounding may leave a speed below 0 where a plan comes to a stand."""
-ON_GRID = 1e-6
-"""Share of a step within which a knot counts as lying on it."""
 
 
 @kernel

@@ -12,8 +12,10 @@ from itertools import count
 from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import TIME, station_and_speed, time_at_station
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules
-from coramp.worlds.sumo.commands import ON_GRID, command_table, correction
+from coramp.vehicles.merge_state import is_planned
+from coramp.worlds.sumo.commands import command_table, correction
 from coramp.worlds.sumo.demand import cooperative_type
 from coramp.worlds.sumo.session import Session
 
@@ -115,7 +117,7 @@ class CooperativePlant:
         exit_s = time_at_station(pieces, self._exit_m - BEFORE_EXIT_M)
         last = math.inf
         if exit_s < math.inf:
-            last = math.ceil(exit_s / self._step_s - ON_GRID) - 1
+            last = first_step_from(exit_s, self._step_s) - 1
         first = round(pieces[0, TIME] / self._step_s)
         commands = self._commands(pieces, first, last)
         if vehicle.following is not None:
@@ -123,8 +125,8 @@ class CooperativePlant:
         following = vehicle.following = Following(row, pieces, commands, last)
         if commands:
             self._push(first, SPEED, following)
-        if math.isfinite(merge_time_s):
-            change = math.ceil(merge_time_s / self._step_s - ON_GRID) - 1
+        if is_planned(merge_time_s):
+            change = first_step_from(merge_time_s, self._step_s) - 1
             if change >= first:
                 self._push(change, MERGE, following)
                 self._push(change + 1, MEASURE, following)

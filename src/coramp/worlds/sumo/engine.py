@@ -15,16 +15,20 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
+from coramp.coordination.service import Service
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
+from coramp.messages.events import Report
 from coramp.messages.feed import RequestFeed
 from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
-from coramp.records.outcome import Outcome, Pieces
+from coramp.records.lanes import first_on_mainline_s, seen_history
+from coramp.records.outcome import Outcome, Pieces, until_s
 from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
 from coramp.scenarios.model import Drivers, Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
+from coramp.vehicles.merge_state import BY_MAINLINE_S
 from coramp.worlds.outcomes import (
     cap_step_of,
     cooperative_outcome,
@@ -43,7 +47,7 @@ from coramp.worlds.sumo.network import (
     road_plan,
 )
 from coramp.worlds.sumo.session import Session
-from coramp.worlds.sumo.telling import positions_in_sumo
+from coramp.worlds.sumo.telling import DriversInSumo, positions_in_sumo, with_answers
 from coramp.worlds.sumo.traits import traits_of
 from coramp.worlds.telling import reports_of_samples, together
 
@@ -159,9 +163,12 @@ def _motion_of(samples: Samples) -> tuple[IntArray, FloatArray, FloatArray, Floa
 
 def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:
     """Returns the outcome with what vehicles drove as SUMO's positions have it, at each step."""
-    first, rows = pieces_of_samples(*_motion_of(samples), len(outcome.passages))
-    lane = np.where(samples.on_mainline, MAINLINE, RAMP)
-    return replace(outcome, driven=Pieces(first, rows), driven_lane=lane)
+    vehicles = len(outcome.passages)
+    first, rows = pieces_of_samples(*_motion_of(samples), vehicles)
+    last_s = np.full(vehicles, np.nan)
+    last_s[samples.vehicle] = samples.time_s  # the last one of each vehicle stays
+    lanes = seen_history(samples.vehicle, samples.on_mainline, samples.time_s, last_s)
+    return replace(outcome, driven=Pieces(first, rows), lanes=lanes)
 
 
 def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) -> Pieces:
@@ -176,7 +183,10 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
 def run_uncontrolled(
     scenario: Scenario, strategy: Decider, drivers: Drivers, seed: int, options: SumoOptions
 ) -> Outcome:
-    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not."""
+    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not.
+
+    They report and are never commanded; the loop is that of cooperative runs.
+    """
     arrivals = arrivals_of(scenario, seed)
     metered = is_metered(strategy)
     plan = driver_road_plan(scenario, drivers, metered)
@@ -186,56 +196,83 @@ def run_uncontrolled(
         files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         traits = traits_of(drivers, arrivals, seed)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered))
-        look_steps = round(LOOK_S / step_s)
+        look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
-            look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
             files.write_loops(loops(scenario, look_steps * step_s))
         with Session(files.options(), step_s, options.gui) as session:
-            meter = Meter(session, scenario, strategy) if metered else None
-            step = 0
-            while step < cap_step and (step == 0 or session.vehicles_left()):
-                until = min(cap_step, step + look_steps)
-                if meter is not None:
-                    meter.run(step, until)
-                session.step_to(until)
-                step = until
+            road = DriversInSumo(session, plan.lane_starts_m(), step_s)
+            meter = Meter(session, step_s) if metered else None
+            service = Service(
+                strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
+            )
+            _let_drive(session, service, road, meter, look_steps, cap_step)
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions = files.collisions()
-    entry_s, merge_s, exit_s = _passing_times(
-        samples, arrivals, finished, scenario.mainline.end_m, step_s
-    )
+    entry_s, exit_s = _passing_times(samples, arrivals, finished, scenario.mainline.end_m, step_s)
     first, rows = pieces_of_samples(
         samples.vehicle, samples.time_s, samples.station_m, samples.speed_mps, len(arrivals)
     )
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
+    end_s = float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s
+    lanes = seen_history(
+        samples.vehicle, samples.on_mainline, samples.time_s, until_s(exit_s, end_s)
+    )
+    merge_s = first_on_mainline_s(lanes, len(arrivals))
+    merge_s[[not arrival.on_ramp for arrival in arrivals]] = BY_MAINLINE_S
     told = None
     if options.keep_messages:
-        last_s = float(np.max(exit_s, initial=0.0)) if left else math.inf
+        last_s = end_s if left else math.inf
         end_step = min(cap_step, step_after(last_s, step_s))
-        told = _told_of_drivers(arrivals, samples, meter, step_s, end_step)
+        told = _told_of_drivers(arrivals, samples, road.told, meter, step_s, end_step)
     return Outcome(
         cooperative=False,
         passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
         pieces=Pieces(first, rows),
         lane=np.where(samples.on_mainline, MAINLINE, RAMP),
         driven=Pieces(first, rows),
-        end_s=float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s,
+        lanes=lanes,
+        end_s=end_s,
         collisions=collisions,
+        refusals=tuple(service.coordinator.refusals),
+        interventions=service.coordinator.interventions,
         told=told,
     )
+
+
+def _let_drive(
+    session: Session,
+    service: Service,
+    road: DriversInSumo,
+    meter: Meter | None,
+    look_steps: int,
+    cap_step: int,
+) -> None:
+    """Lets SUMO run until it is empty; tells the service so far each ``look_steps``, and obeys."""
+    step = 0
+    while step < cap_step and (step == 0 or session.vehicles_left()):
+        until = min(cap_step, step + look_steps)
+        readings = [] if meter is None else [meter.read(step, until)]
+        session.step_to(until)
+        road.now_step = step = until
+        commands = service.handle(readings, step)
+        if meter is not None:
+            meter.obey(commands, step)
 
 
 def _told_of_drivers(
     arrivals: Sequence[Arrival],
     samples: Samples,
+    answers: Sequence[Report],
     meter: Meter | None,
     step_s: float,
     end_step: int,
 ) -> Told:
     """Returns the messages of a run of drivers, who are reported and never commanded."""
+    number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
     positions = reports_of_samples(*_motion_of(samples), step_s)
+    positions = with_answers(positions, answers, number, step_s)
     if meter is None:
         return Told(arrivals, [], positions, [], end_step)
     signals = [signal for signal in meter.signals if signal.step <= end_step]
@@ -249,20 +286,17 @@ def _passing_times(
     finished: set[str],
     end_m: float,
     step_s: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Entry, merge and exit of each vehicle; its last sample is run on to the zone's end."""
-    entry_s, merge_s, exit_s = (np.full(len(arrivals), np.nan) for _ in range(3))
+) -> tuple[FloatArray, FloatArray]:
+    """Entry and exit of each vehicle; its last sample is run on to the zone's end."""
+    entry_s, exit_s = (np.full(len(arrivals), np.nan) for _ in range(2))
     seen, first = np.unique(samples.vehicle, return_index=True)
     last = np.append(first[1:], len(samples.vehicle))[: len(first)] - 1
     entry_s[seen] = samples.time_s[first]
-    merged, at = np.unique(samples.vehicle[samples.on_mainline], return_index=True)
-    merge_s[merged] = samples.time_s[samples.on_mainline][at]
-    merge_s[[not arrival.on_ramp for arrival in arrivals]] = -math.inf
     left_m = end_m - samples.station_m[last]
     run_on_s = np.minimum(left_m / np.maximum(samples.speed_mps[last], 1e-9), step_s)
     exit_s[seen] = samples.time_s[last] + run_on_s
     done = np.array([arrival.vehicle_id in finished for arrival in arrivals], np.bool_)
-    return entry_s, merge_s, np.where(done, exit_s, np.nan)
+    return entry_s, np.where(done, exit_s, np.nan)
 
 
 class _Files:

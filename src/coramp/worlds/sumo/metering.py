@@ -1,12 +1,11 @@
 """A signal at the ramp and loops on the road, for strategies that meter ordinary drivers."""
 
 import math
+from collections.abc import Iterable
 
-from coramp.coordination.metered import MeteredRoad
-from coramp.messages.commands import SetSignal
+from coramp.messages.commands import Command, SetSignal
 from coramp.messages.events import DetectorReading
 from coramp.scenarios.model import Scenario
-from coramp.strategies.base import Decider
 from coramp.worlds.sumo.session import GREEN, RED, YELLOW, Session
 
 MAINLINE_LOOP, QUEUE_LOOP = "mainline", "queue"
@@ -44,23 +43,22 @@ def queue_loop_m(scenario: Scenario) -> float:
 
 
 class Meter:
-    """Reads the loops once a period, tells the strategy, and sets the signal as it commands.
+    """Reads the loops once a period, and sets the signal as it is commanded.
 
-    ``readings`` and ``signals`` are what it was told and what it commanded.
+    ``readings`` and ``signals`` are what the loops told and what was commanded.
     """
 
-    def __init__(self, session: Session, scenario: Scenario, strategy: Decider) -> None:
+    def __init__(self, session: Session, step_s: float) -> None:
         self._session = session
-        self._step_s = scenario.control.step_s
-        self._loop = MeteredRoad(strategy, scenario.rules(), scenario.fastest_mainline_entry_mps)
+        self._step_s = step_s
         self._red_s = math.inf
         self._on_ramp: set[str] = set()
         self.readings: list[DetectorReading] = []
         self.signals: list[SetSignal] = []
         session.set_signal(SIGNAL, RAMP_LANE, GREEN)
 
-    def run(self, first_step: int, last_step: int) -> None:
-        """Drives up to ``last_step``, asks the strategy with what the loops told, and does it."""
+    def read(self, first_step: int, last_step: int) -> DetectorReading:
+        """Drives up to ``last_step`` and returns what the loops tell of the time till then."""
         mainline = queue = 0.0
         for step in range(first_step + 1, last_step + 1):
             self._session.step_to(step)
@@ -70,15 +68,18 @@ class Meter:
         waiting = self._session.vehicles_on(RAMP_LANE)
         passed, self._on_ramp = len(self._on_ramp - waiting), waiting
         time_s = last_step * self._step_s
-        self._decide(DetectorReading(time_s, mainline / steps, queue / steps, passed))
+        self.readings.append(DetectorReading(time_s, mainline / steps, queue / steps, passed))
+        return self.readings[-1]
 
-    def _decide(self, reading: DetectorReading) -> None:
-        signals = self._loop.handle(reading)
-        self.readings.append(reading)
-        self.signals += signals
-        for signal in signals:
+    def obey(self, commands: Iterable[Command], step: int) -> None:
+        """Sets the signal at ``step``: yellow first where it is to be red."""
+        time_s = step * self._step_s
+        for signal in commands:
+            if not isinstance(signal, SetSignal):
+                continue
+            self.signals.append(signal)
             self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if signal.green else YELLOW)
-            self._red_s = math.inf if signal.green else reading.time_s + YELLOW_S
-        if reading.time_s >= self._red_s:
+            self._red_s = math.inf if signal.green else time_s + YELLOW_S
+        if time_s >= self._red_s:
             self._session.set_signal(SIGNAL, RAMP_LANE, RED)
             self._red_s = math.inf

@@ -125,6 +125,16 @@ class Session:
         state = "".join(colour if link[0][0] == lane else GREEN for link in links)
         libsumo.trafficlight.setRedYellowGreenState(signal, state)
 
+    def since_before(self, step: int) -> list[str]:
+        """Returns who is on the road and entered before ``step``."""
+        now_s = (step - 0.5) * self._step_s
+        everyone: tuple[str, ...] = libsumo.vehicle.getIDList()
+        return [name for name in everyone if libsumo.vehicle.getDeparture(name) < now_s]
+
+    def speed_mps(self, vehicle_id: str) -> float:
+        """Returns how fast a vehicle on the road is."""
+        return float(libsumo.vehicle.getSpeed(vehicle_id))
+
     def loop_occupancy(self, loop: str) -> float:
         """Returns the share of the last step for which a loop was occupied.
 

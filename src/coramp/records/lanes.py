@@ -1,0 +1,77 @@
+"""The lane history of a run: who was on which lane from when to when.
+
+There is one of a run. Plans change lanes once, at the merge time that the ledger holds; what a
+simulator drives is where it was seen. The figures of safety read nothing else about lanes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
+
+
+class LaneHistory(NamedTuple):
+    """Stays, one entry each: a vehicle in one lane from when it comes until it leaves.
+
+    ``on_mainline`` is False on the ramp with its acceleration lane. ``from_s`` is nan for a stay
+    that never began. ``merged`` tells that it began with a change of lanes onto the mainline. A
+    vehicle may come to a lane more than once.
+    """
+
+    vehicle: IntArray
+    on_mainline: BoolArray
+    from_s: FloatArray
+    until_s: FloatArray
+    merged: BoolArray
+
+    def on(self, mainline: bool) -> "LaneHistory":
+        """Returns the stays on the mainline alone, or all others."""
+        chosen = self.on_mainline if mainline else ~self.on_mainline
+        return LaneHistory._make(column[chosen] for column in self)
+
+
+def planned_history(
+    on_ramp: BoolArray, entry_s: FloatArray, merge_s: FloatArray, until_s: FloatArray
+) -> LaneHistory:
+    """Returns the history of vehicles that change lanes at ``merge_s`` at most, nan for never.
+
+    Arrays have one entry a vehicle; ``until_s`` is when it leaves, or the run ends without it.
+    """
+    vehicles = np.arange(len(on_ramp))
+    until_s = np.where(np.isnan(entry_s), np.nan, until_s)
+    return LaneHistory(
+        np.concatenate([vehicles, vehicles]),
+        np.repeat([True, False], len(vehicles)),
+        np.concatenate([np.where(on_ramp, merge_s, entry_s), np.where(on_ramp, entry_s, np.nan)]),
+        np.concatenate([until_s, np.where(np.isnan(merge_s), until_s, merge_s)]),
+        np.concatenate([on_ramp, np.zeros(len(vehicles), np.bool_)]),
+    )
+
+
+def seen_history(
+    vehicle: IntArray, on_mainline: BoolArray, time_s: FloatArray, until_s: FloatArray
+) -> LaneHistory:
+    """Returns the history of vehicles from where they were seen, by vehicle and time.
+
+    ``until_s`` has one entry a vehicle: when it leaves the lane in which it was seen last. When the
+    mainline stands some drivers overtake on the acceleration lane, and so change lanes again.
+    """
+    same = vehicle[1:] == vehicle[:-1]
+    begins = np.append(True, ~same | (on_mainline[1:] != on_mainline[:-1]))[: len(vehicle)]
+    starts = np.flatnonzero(begins)
+    whose = vehicle[starts]
+    again = np.append(False, whose[1:] == whose[:-1])[: len(starts)]
+    goes_on = np.append(again[1:], False)[: len(starts)]
+    next_s = np.append(time_s[starts[1:]], np.nan)[: len(starts)]
+    to_s = np.where(goes_on, next_s, until_s[whose])
+    return LaneHistory(
+        whose, on_mainline[starts], time_s[starts], to_s, again & on_mainline[starts]
+    )
+
+
+def first_on_mainline_s(history: LaneHistory, vehicles: int) -> FloatArray:
+    """Returns when each vehicle first came onto the mainline, nan for never."""
+    found_s, stays = np.full(vehicles, np.nan), history.on(mainline=True)
+    found_s[stays.vehicle[::-1]] = stays.from_s[::-1]
+    return found_s
