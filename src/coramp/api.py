@@ -17,6 +17,7 @@ from coramp.runs.expected_queue import (
     demand_above_limit,
     demands_above_limit,
     seeds_without_effect,
+    without_effect_on_drivers,
 )
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
@@ -102,6 +103,8 @@ def run(
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
+    if notice is not None and (line := without_effect_on_drivers([spec])) is not None:
+        notice(line)
     if notice is not None and seed != 1 and not spec.seed_matters:
         notice(f"arrivals are listed: with {strategy} seed {seed} changes nothing")
     if out is None:
@@ -151,6 +154,8 @@ def study(
     specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
     if notice is not None and (line := demands_above_limit(specs)) is not None:
+        notice(line)
+    if notice is not None and (line := without_effect_on_drivers(specs)) is not None:
         notice(line)
     if notice is not None and seeds > 1 and (line := seeds_without_effect(specs)) is not None:
         notice(line)

@@ -113,6 +113,38 @@ def test_both_units_of_a_speed_are_refused_in_one_line(bare, kmh, mps, there):
     assert line.endswith("allowed is one of the two")
 
 
+def test_a_misspelt_speed_is_one_error_that_names_the_key_in_kmh(bare):
+    told = invoke("run", bare({"speed_kmh = 110": "speed_kph = 110"}))
+    assert_refused(told)
+    (line,) = told.errors
+    assert "mainline.speed_kph: unknown key; did you mean speed_kmh? allowed are " in line
+    assert "limit_kmh" in line
+
+
+def test_a_speed_that_is_missing_is_one_error(bare):
+    told = invoke("run", bare({"speed_kmh = 65\n": ""}))
+    assert_refused(told)
+    (line,) = told.errors
+    assert line.endswith("bare.toml: ramp.speed_mps: is missing; it must be given")
+
+
+def test_populations_that_every_scenario_has_can_be_set(bare):
+    scenario = load_scenario(bare(), {"drivers.fair.tau_s": 1.4})
+    paper = load_scenario("paper", {"drivers.fair.tau_s": 1.4})
+    assert scenario.drivers["fair"] == paper.drivers["fair"]
+    assert scenario.drivers["credible"] == load_scenario("paper").drivers["credible"]
+
+
+def test_gaps_of_commanded_vehicles_are_said_to_change_nothing_for_drivers(bare):
+    notes = []
+    overrides = {"safety.time_gap_s": 1.4, "drivers.fair.sigma": 0.0}
+    coramp.run(bare(), "uncontrolled", overrides=overrides, horizon_s=20.0, notice=notes.append)
+    assert notes == [
+        "safety.time_gap_s: changes nothing for drivers; what they keep is drivers.fair.tau_s and "
+        "drivers.fair.min_gap_m"
+    ]
+
+
 def test_settings_may_be_in_kmh_and_take_the_place_of_the_files(bare):
     spec = make_spec(bare(), overrides={"mainline.speed_kmh": 90})
     assert spec.scenario.mainline.speed_mps == 25.0

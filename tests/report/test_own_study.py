@@ -13,9 +13,10 @@ from coramp.report.over_time_figure import (
     speeds_over_time_figure,
 )
 from coramp.report.page.study_answer import own_answer
+from coramp.report.varied_figure import varied
 from coramp.report.writing import report
 from coramp.studies.speed_unit import KMH
-from coramp.studies.tables import Table
+from coramp.studies.tables import Table, without_same
 from tests.edges import invoke
 from tests.study import overridden, run_row, runs_of
 
@@ -136,6 +137,28 @@ def test_the_answer_says_how_sure_it_is():
         *delays("slots", (1.0,)), overridden(run_row(delay_s=3.0), "safety.adhesion=0.3")
     )
     assert "Slots loses least, 1.00 s a vehicle." in own_answer(once)
+    named = own_answer(once, {"safety": {"adhesion": 0.4}})
+    assert "With safety.adhesion=0.4 slots loses least" in named
+
+
+def test_what_a_run_does_not_set_stands_in_its_place_among_what_others_set():
+    runs = runs_of(
+        run_row(delay_s=1.0),
+        *(overridden(run_row(delay_s=3.0), f"safety.time_gap_s={gap}") for gap in (0.6, 1.4)),
+    )
+    values = [
+        run.values["safety.time_gap_s"] for run in varied(runs, {"safety": {"time_gap_s": 1.0}})
+    ]
+    assert sorted(values) == [0.6, 1.0, 1.4]
+    assert varied(runs)[0].values["safety.time_gap_s"] == "as it is"
+
+
+def test_columns_that_are_the_same_in_all_rows_become_a_note():
+    table = Table("t", ("a", "b", "c"), (("1", "x", "2"), ("3", "x", "4")), ("n",))
+    slim = without_same(table)
+    assert (slim.columns, slim.rows) == (("a", "c"), (("1", "2"), ("3", "4")))
+    assert slim.notes == ("n", "In all rows: b x.")
+    assert without_same(slim) == slim
 
 
 def test_a_column_of_numbers_knows_it():

@@ -75,7 +75,7 @@ def _bound_lines(summary: Row) -> list[tuple[str, str]]:
         return []
     return [
         (
-            "least delay that the lane allows (s), delay over that",
+            "least delay that the lane allows (s), and the delay as a multiple of it",
             _two(summary, "delay_bound_s", "delay_bound_ratio"),
         ),
         ("most that the lane carries (veh/h)", number(summary["lane_limit_veh_h"], 0)),

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coramp.studies.tables import Table, is_number
+from coramp.studies.tables import Table, columns_of, is_number, without_same
 
 NARROW = 80
 """Characters that a terminal is sure to have."""
@@ -40,45 +40,25 @@ def fitted(table: Table, width: int = NARROW) -> Table:
     """
     if _needed(least_widths(table)) <= width:
         return table
-    same = _same(table)
-    slim = _columns(table, [k for k in range(len(table.columns)) if k not in same])
+    slim = without_same(table)
     widths = least_widths(slim)
     kept: list[int] = []
     for place in _by_importance(slim):
         if not kept or _needed([widths[k] for k in (*kept, place)]) <= width:
             kept.append(place)
     left_out = [name for k, name in enumerate(slim.columns) if k not in kept]
-    notes = list(table.notes)
-    if same:
-        told = (f"{table.columns[k]} {table.rows[0][k]}" for k in same)
-        notes.append(f"In all rows: {', '.join(told)}.")
+    notes = list(slim.notes)
     if left_out:
         notes.append(f"With --wide also: {', '.join(left_out)}.")
-    return replace(_columns(slim, sorted(kept)), notes=tuple(notes))
+    return replace(columns_of(slim, sorted(kept)), notes=tuple(notes))
 
 
 def _needed(widths: Sequence[int]) -> int:
     return sum(widths) + BETWEEN * max(0, len(widths) - 1) + MARGINS
 
 
-def _same(table: Table) -> list[int]:
-    """Places of columns that are the same in all of several rows, unless all are."""
-    if len(table.rows) < 2:
-        return []
-    found = [k for k in range(len(table.columns)) if len({row[k] for row in table.rows}) == 1]
-    return found if len(found) < len(table.columns) else []
-
-
 def _by_importance(table: Table) -> list[int]:
     rank = {name: place for place, name in enumerate(table.importance)}
     return sorted(
         range(len(table.columns)), key=lambda k: (rank.get(table.columns[k], len(rank)), k)
-    )
-
-
-def _columns(table: Table, kept: Sequence[int]) -> Table:
-    return replace(
-        table,
-        columns=tuple(table.columns[k] for k in kept),
-        rows=tuple(tuple(row[k] for k in kept) for row in table.rows),
     )

@@ -100,9 +100,10 @@ class StudyPlots:
             from coramp.report.flow_figures import delay_figure
 
             return delay_figure(self._good())
+        from coramp.report.study_folder import scenario_of
         from coramp.report.varied_figure import varied_figure
 
-        return varied_figure(self._good(), over)
+        return varied_figure(self._good(), over, scenario_of(self.folder))
 
     def plot_gain(self) -> "Figure":
         """Returns the delay (%) that cooperation saves against both populations of drivers.

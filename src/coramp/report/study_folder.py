@@ -86,6 +86,15 @@ def study_content(folder: Path) -> Row:
     return content
 
 
+def scenario_of(folder: Path) -> Row | None:
+    """Returns the content of a study's scenario; None where the folder tells of none."""
+    try:
+        found = study_content(folder).get("scenario")
+    except CorampError:
+        return None
+    return found if isinstance(found, dict) else None
+
+
 def stored_runs(folder: Path) -> tuple[Study, pl.DataFrame]:
     """Returns a study and its runs from its folder, as many as are done.
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
 from coramp.report.style import BLACK, COLOURS, Look, grid, legend_below, look_of, new_figure
-from coramp.studies.overrides import overrides_of
+from coramp.studies.overrides import overrides_of, scenario_value
 from coramp.studies.statistics import estimate
 
 DELAYS = {"all": "delay_s", "mainline": "mainline_delay_s", "ramp": "ramp_delay_s"}
@@ -29,15 +29,19 @@ class Varied(NamedTuple):
     delays_s: tuple[float | None, ...]
 
 
-def varied(good: pl.DataFrame) -> list[Varied]:
-    """Returns the runs of a study with everything that was set or asked for in them."""
+def varied(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) -> list[Varied]:
+    """Returns the runs of a study with everything that was set or asked for in them.
+
+    What a run does not set is the value of the ``scenario``, or "as it is" where that is not known.
+    """
     every = [overrides_of(row) for row in good.iter_rows(named=True)]
     keys = sorted({key for found in every for key in found})
+    own = {key: _own_value(scenario or {}, key) for key in keys}
     return [
         Varied(
             {
                 FLOW: (row["mainline_veh_h"], row["ramp_veh_h"]),
-                **{key: _plain(found.get(key, "as it is")) for key in keys},
+                **{key: _plain(found.get(key, own[key])) for key in keys},
             },
             (row["strategy"], row["drivers"]),
             row["seed"],
@@ -45,6 +49,11 @@ def varied(good: pl.DataFrame) -> list[Varied]:
         )
         for row, found in zip(good.iter_rows(named=True), every, strict=True)
     ]
+
+
+def _own_value(scenario: Mapping[str, Any], key: str) -> Any:
+    value = scenario_value(scenario, key)
+    return "as it is" if value is None else value
 
 
 def _plain(value: Any) -> Any:
@@ -62,9 +71,9 @@ def dimensions(runs: Sequence[Varied]) -> list[str]:
     return [*found, *([STRATEGY] if len({run.who for run in runs}) > 1 else [])]
 
 
-def readable(good: pl.DataFrame) -> str | None:
+def readable(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) -> str | None:
     """Returns over what the figure of a study has few enough rows, None where over nothing."""
-    runs = varied(good)
+    runs = varied(good, scenario)
     names = dimensions(runs) or [FLOW]
     return next((n for n in names if len(_panels(runs, _others(names, n))) <= MOST_PANELS), None)
 
@@ -78,16 +87,19 @@ def _panels(runs: Sequence[Varied], others: Sequence[str]) -> list[tuple[Any, ..
     return sorted({tuple(run.values[n] for n in others) for run in runs}, key=_order)
 
 
-def varied_figure(good: pl.DataFrame, over: str | None = None) -> Figure:
+def varied_figure(
+    good: pl.DataFrame, over: str | None = None, scenario: Mapping[str, Any] | None = None
+) -> Figure:
     """Returns mean delay (s) over what varies, with 95 % intervals over seeds.
 
     A column each for all, mainline and ramp; a line a strategy. ``over`` is ``flow``, ``strategy``
     or a dotted key that the study sets (default: the first that varies); what else varies gives
     rows of its own. The lowest row, where there are several strategies, is how much more each loses
-    than the first that is named, seed by seed on the same arrivals. Raises CorampError for what
+    than the first that is named, seed by seed on the same arrivals. ``scenario`` is the content of
+    the study's scenario, whose values stand where a run sets none. Raises CorampError for what
     does not vary, and for too many rows.
     """
-    runs = varied(good)
+    runs = varied(good, scenario)
     names = dimensions(runs)
     over = over or (names[0] if names else FLOW)
     if over not in names and over not in (FLOW, STRATEGY):

@@ -6,6 +6,9 @@ from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
 from coramp.runs.running import RunSpec
 from coramp.scenarios.model import Safety
 
+OF_AUTOMATION = ("safety.", "motion.")
+"""Sections that bind vehicles that are commanded, and no drivers."""
+
 
 def demand_above_limit(spec: RunSpec) -> str | None:
     """Returns in a line that a cooperative run's flows are above its lane's limit, else None.
@@ -34,6 +37,24 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
     if not told:
         return None
     return f"{len(told)} of {len(specs)} runs are above what their lane carries; such as {told[0]}"
+
+
+def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
+    """Returns in a line which settings of runs with drivers change nothing for them, or None."""
+    found = {
+        key: spec.drivers
+        for spec in specs
+        if spec.drivers is not None
+        for key, _ in spec.overrides
+        if key.startswith(OF_AUTOMATION)
+    }
+    if not found:
+        return None
+    keys, population = ", ".join(found), next(reversed(found.values()))
+    return (
+        f"{keys}: changes nothing for drivers; what they keep is drivers.{population}.tau_s and "
+        f"drivers.{population}.min_gap_m"
+    )
 
 
 def seeds_without_effect(specs: Sequence[RunSpec]) -> str | None:

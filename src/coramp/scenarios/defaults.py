@@ -30,10 +30,15 @@ def with_defaults(data: Mapping[str, Any], label: str) -> dict[str, Any]:
     for stream in STREAMS:
         if isinstance(data.get(stream), dict):
             result[stream] = _with_speeds(data[stream], stream)
-    own = data.get("drivers", {})
-    if isinstance(own, dict):
-        result["drivers"] = {**own, **{k: v for k, v in populations().items() if k not in own}}
     return result
+
+
+def with_populations(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the content of a scenario file with the populations that every scenario has."""
+    own = data.get("drivers", {})
+    if not isinstance(own, dict):
+        return dict(data)
+    return {**data, "drivers": {**own, **{k: v for k, v in populations().items() if k not in own}}}
 
 
 @cache

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.scenarios.defaults import with_defaults
+from coramp.scenarios.defaults import with_defaults, with_populations
 from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
@@ -26,6 +26,7 @@ def load_scenario(
     overrides = overrides or {}
     blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
     overrides, blamed = overrides_in_mps(overrides, blamed)
+    data = with_populations(data)
     data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
     data = with_defaults(with_listed_flows(data, label, blamed), label)
     return validated(Scenario, data, label, {**in_kmh, **blamed})

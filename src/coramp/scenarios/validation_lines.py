@@ -8,6 +8,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from coramp.scenarios.speeds_kmh import KEYS, in_mps
+
+Location = tuple[int | str, ...]
 SHAPES = ("(one)", "(list)")
 """Tags of a value that may be one or a list; they are no part of its key."""
 
@@ -18,7 +21,7 @@ def lines_of(model: type[BaseModel], data: Mapping[str, Any], error: ValidationE
     What must fit together is checked once every key by itself is right; unknown keys do not keep it
     from being told.
     """
-    causes = _causes(error)
+    causes = _causes(model, error)
     lines = _told(model, error)
     if all(problem["type"] == "extra_forbidden" for problem in causes):
         lines += _problems_without(model, data, [problem["loc"] for problem in causes])
@@ -26,11 +29,11 @@ def lines_of(model: type[BaseModel], data: Mapping[str, Any], error: ValidationE
 
 
 def _told(model: type[BaseModel], error: ValidationError) -> list[str]:
-    return [line for problem in _causes(error) for line in _lines_of(model, problem)]
+    return [line for problem in _causes(model, error) for line in _lines_of(model, problem)]
 
 
 def _problems_without(
-    model: type[BaseModel], data: Mapping[str, Any], unknown: Sequence[tuple[int | str, ...]]
+    model: type[BaseModel], data: Mapping[str, Any], unknown: Sequence[Location]
 ) -> list[str]:
     """What else is wrong, whatever the unknown keys were meant to be.
 
@@ -43,12 +46,13 @@ def _problems_without(
         table = _table_of(meant, location)
         value = table.pop(location[-1])
         if near := _near_keys(model, location):
-            table.setdefault(near[0], value)
+            in_kmh = near[0] in KEYS
+            table.setdefault(KEYS.get(near[0], near[0]), in_mps(value) if in_kmh else value)
     lines, others = _together(model, left_out), _together(model, meant)
     return [line for line in lines or () if others is None or line in others]
 
 
-def _table_of(data: Mapping[str, Any], location: tuple[int | str, ...]) -> Any:
+def _table_of(data: Mapping[str, Any], location: Location) -> Any:
     table: Any = data
     for part in location[:-1]:
         if part not in SHAPES:
@@ -66,16 +70,41 @@ def _together(model: type[BaseModel], data: Mapping[str, Any]) -> list[str] | No
     return []
 
 
-def _causes(error: ValidationError) -> list[Any]:
-    """The problems without those that only follow: a list whose items fail counts as too short."""
+def _causes(model: type[BaseModel], error: ValidationError) -> list[Any]:
+    """The problems without those that only follow from others.
+
+    A list whose items fail counts as too short, a misspelt key as missing, and so does what is
+    chosen by a stream's speed where that is missing.
+    """
     problems = error.errors()
     places = [problem["loc"] for problem in problems]
+    misspelt = {
+        (*place[:-1], KEYS.get(near, near))
+        for problem in problems
+        if problem["type"] == "extra_forbidden"
+        for place in [problem["loc"]]
+        for near in _near_keys(model, place)
+    }
+    missing = {problem["loc"] for problem in problems if problem["type"] == "missing"}
     return [
         problem
         for problem in problems
-        if problem["type"] != "too_short"
-        or not any(p[: len(problem["loc"])] == problem["loc"] != p for p in places)
+        if not (
+            (problem["type"] == "too_short" and _fails_within(problem["loc"], places))
+            or (problem["type"] == "missing" and problem["loc"] in misspelt)
+            or (problem["type"] == "missing" and _follows_from(problem["loc"]) in missing)
+        )
     ]
+
+
+def _fails_within(place: Location, places: Sequence[Location]) -> bool:
+    return any(other[: len(place)] == place != other for other in places)
+
+
+def _follows_from(place: Location) -> Location | None:
+    """The key that a missing one is chosen by where it is left out: a stream's speed."""
+    follows = place[-1] in ("limit_mps", "entry_speed_mps")
+    return (*place[:-1], "speed_mps") if follows else None
 
 
 def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
@@ -127,18 +156,18 @@ def _out_of_range(key: str, value: float, context: Mapping[str, float]) -> str:
     return text
 
 
-def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+def _allowed_keys(model: type[BaseModel], location: Location) -> str:
     near = _near_keys(model, location)
     hint = f"did you mean {near[0]}? " if near else ""
     return f"{hint}allowed are {', '.join(_keys_at(model, location))}"
 
 
-def _near_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+def _near_keys(model: type[BaseModel], location: Location) -> list[str]:
     """The key that an unknown one resembles most, if there is one."""
     return difflib.get_close_matches(str(location[-1]), _keys_at(model, location), 1)
 
 
-def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
     """The keys that a table may have in which a key lies."""
     inner: Any = None
     for part in location[:-1]:
@@ -151,7 +180,8 @@ def _keys_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[st
             model = inner
         elif not isinstance(part, int):
             model = _model_within(inner) or model
-    return sorted(model.model_fields)
+    in_kmh = [kmh for kmh, mps in KEYS.items() if mps in model.model_fields]
+    return sorted([*model.model_fields, *in_kmh])
 
 
 def _shape_of(annotation: Any, tag: str) -> Any:

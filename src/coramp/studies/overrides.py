@@ -17,12 +17,17 @@ def _as_float(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+def scenario_value(scenario: Mapping[str, Any], key: str) -> Any:
+    """Returns the value of a dotted key in the content of a scenario; None if there is none."""
+    value: Any = scenario
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    return value
+
+
 def setting_of(run: Mapping[str, Any], key: str) -> Any:
     """Returns what a dotted key of the scenario was in a run, set or not; None if there is none."""
     found = overrides_of(run)
     if key in found:
         return found[key]
-    value: Any = load_scenario(run["scenario"]).model_dump()
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, dict) else None
-    return value
+    return scenario_value(load_scenario(run["scenario"]).model_dump(), key)

@@ -2,7 +2,8 @@
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from coramp.studies.statistics import Estimate
 
@@ -41,6 +42,33 @@ class Table:
         lines += ["| " + " | ".join(row) + " |" for row in self.rows]
         lines += [line for note in self.notes for line in ("", note)]
         return "\n".join(lines) + "\n"
+
+
+def without_same(table: Table) -> Table:
+    """Returns a table without columns that are the same in all rows; a note says what they are."""
+    same = _same(table)
+    if not same:
+        return table
+    told = ", ".join(f"{table.columns[k]} {table.rows[0][k]}" for k in same)
+    kept = [k for k in range(len(table.columns)) if k not in same]
+    return replace(columns_of(table, kept), notes=(*table.notes, f"In all rows: {told}."))
+
+
+def _same(table: Table) -> list[int]:
+    """Places of columns that are the same in all of several rows, unless all are."""
+    if len(table.rows) < 2:
+        return []
+    found = [k for k in range(len(table.columns)) if len({row[k] for row in table.rows}) == 1]
+    return found if len(found) < len(table.columns) else []
+
+
+def columns_of(table: Table, kept: Sequence[int]) -> Table:
+    """Returns a table with some of its columns, by place."""
+    return replace(
+        table,
+        columns=tuple(table.columns[k] for k in kept),
+        rows=tuple(tuple(row[k] for k in kept) for row in table.rows),
+    )
 
 
 def number(value: float | None, digits: int = 2) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -23,8 +24,10 @@ from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
 from coramp.report.varied_figure import readable, varied_figure
+from coramp.runs.expected_queue import OF_AUTOMATION
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
+from coramp.studies.overrides import overrides_of
 from coramp.studies.shown import (
     SHOWN_DRIVERS,
     plain,
@@ -36,7 +39,7 @@ from coramp.studies.shown import (
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.statistics import estimate
 from coramp.studies.summary import promises, summary_tables
-from coramp.studies.tables import Table, with_interval
+from coramp.studies.tables import Table, with_interval, without_same
 
 DRAWN = {
     "paper": (
@@ -76,11 +79,11 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         "study.html",
         title=f"Report: study {study.name}",
         subtitle=study.description,
-        asked=_asked(study, good, listed=_lists_arrivals(content)),
-        answer=own_answer(good) if study.layout == "plain" else _answer(good),
+        asked=_asked(study, good, content, unit),
+        answer=own_answer(good, content["scenario"]) if study.layout == "plain" else _answer(good),
         notes=[*_notes(study, every, listed=_lists_arrivals(content)), *said],
-        tables=summary_tables(study, every, unit),
-        pictures=[*pictures_of(study.layout, good), *over_time],
+        tables=[without_same(table) for table in summary_tables(study, every, unit)],
+        pictures=[*pictures_of(study.layout, good, content["scenario"]), *over_time],
         failed=_failed(every),
         sure=_how_sure(good, listed=_lists_arrivals(content)),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
@@ -101,7 +104,8 @@ def _lists_arrivals(content: Row) -> bool:
     return isinstance(scenario, dict) and bool(scenario.get("arrivals"))
 
 
-def _asked(study: Study, good: pl.DataFrame, *, listed: bool) -> Table:
+def _asked(study: Study, good: pl.DataFrame, content: Row, unit: SpeedUnit) -> Table:
+    listed = _lists_arrivals(content)
     flows = good.select("mainline_veh_h", "ramp_veh_h").unique().sort(pl.all())
     pairs = [f"{mainline:g} + {ramp:g}" for mainline, ramp in flows.iter_rows()]
     shown = ", ".join(pairs) if len(pairs) <= 12 else f"{pairs[0]} to {pairs[-1]} ({len(pairs)})"
@@ -112,8 +116,22 @@ def _asked(study: Study, good: pl.DataFrame, *, listed: bool) -> Table:
         ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
+        *_road(content["scenario"], unit),
     )
     return Table("What was computed", ("what", "value"), rows)
+
+
+def _road(scenario: Row, unit: SpeedUnit) -> list[tuple[str, str]]:
+    """The scenario's road and gaps, as far as runs do not set them."""
+    mainline, ramp, safety = (scenario[name] for name in ("mainline", "ramp", "safety"))
+    speeds = (unit.of(stream["speed_mps"]) for stream in (mainline, ramp))
+    return [
+        (f"speeds, mainline and ramp ({unit.name})", " and ".join(f"{v:.4g}" for v in speeds)),
+        ("acceleration lane (m)", f"{ramp['acceleration_lane_m']:g}"),
+        ("time gap (s)", f"{safety['time_gap_s']:g}"),
+        ("standstill gap (m)", f"{safety['standstill_gap_m']:g}"),
+        ("horizon of a run (s)", f"{scenario['simulation']['horizon_s']:g}"),
+    ]
 
 
 def _answer(good: pl.DataFrame) -> str:
@@ -156,9 +174,22 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     if runs.height < asked:
         most = "at most " if study.searches else ""
         yield f"{runs.height} of {most}{asked} runs with {seeds} seeds are done and reported here."
+    keys = _without_effect(runs)
+    if keys:
+        yield (
+            f"{', '.join(keys)} changes nothing for drivers: their runs are the same with each of "
+            "its values. What they keep is tau_s and min_gap_m of their population."
+        )
     failed = runs.filter(status="failed").height
     if failed:
         yield f"{failed} of {runs.height} runs failed; they are listed below and count nowhere."
+
+
+def _without_effect(runs: pl.DataFrame) -> list[str]:
+    """The settings of runs with drivers that bind commanded vehicles alone."""
+    of_drivers = runs.filter(pl.col("drivers").is_not_null()).iter_rows(named=True)
+    keys = {key: None for row in of_drivers for key in overrides_of(row)}
+    return [key for key in keys if key.startswith(OF_AUTOMATION)]
 
 
 def _failed(runs: pl.DataFrame) -> Table | None:
@@ -198,14 +229,16 @@ def _how_sure(good: pl.DataFrame, *, listed: bool) -> list[str]:
     ]
 
 
-def pictures_of(layout: str, good: pl.DataFrame) -> list[Row]:
+def pictures_of(
+    layout: str, good: pl.DataFrame, scenario: Mapping[str, Any] | None = None
+) -> list[Row]:
     """Returns the figures of a study's layout, of the runs that went well, as parts of a page."""
     if good.is_empty():
         return []
     if layout in DRAWN:
         return [picture(text, draw(good)) for text, draw in DRAWN[layout]]
-    over = readable(good)
-    return [picture(OWN, varied_figure(good, over))] if over is not None else []
+    over = readable(good, scenario)
+    return [picture(OWN, varied_figure(good, over, scenario))] if over is not None else []
 
 
 def _shown(folder: Path, good: pl.DataFrame) -> tuple[dict[str, list[RunRecords]], list[str]]:
