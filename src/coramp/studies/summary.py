@@ -96,8 +96,10 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
     )
     notes = (
         "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle.",
-        "The least that the lane allows is lower where vehicles drove faster than the mainline's "
-        "speed, or left closer together than their gaps ask for.",
+        (
+            "The least that the lane allows is lower where vehicles drove faster than the "
+            "mainline's speed, or left closer together than their gaps ask for."
+        ),
     )
     return Table("All runs", columns, tuple(rows), notes, IMPORTANT)
 
