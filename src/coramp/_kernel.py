@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 import numpy.typing as npt
+from numba import extending
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -36,6 +37,15 @@ def kernel(function: Function) -> Function:
     finally:
         settings.CACHE_DIR = previous
     return compiled  # type: ignore[no-any-return]
+
+
+def kernel_part(function: Function) -> Function:
+    """Returns ``function`` as plain Python, which kernels that call it compile with themselves.
+
+    For what Python asks often: a call from there into compiled code costs more than a comparison.
+    """
+    registered: Function = extending.register_jitable(function)
+    return registered
 
 
 @cache

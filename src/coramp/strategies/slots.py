@@ -145,7 +145,7 @@ class Slots:
                 int(proposal.rows[k]),
                 proposal.pieces[k, : proposal.piece_count[k]].copy(),
                 float(proposal.merge_time_s[k]),
-                makes_gap=has_place_on_mainline(view.fleet.merge_time_s[proposal.rows[k]]),
+                makes_gap=bool(has_place_on_mainline(view.fleet.merge_time_s[proposal.rows[k]])),
             )
             for k in range(int(proposal.size[0]))
         )
