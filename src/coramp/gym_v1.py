@@ -1,0 +1,195 @@
+"""Merge-v1: ramp vehicles ask for their slots in the lane, one at a time, and share one policy.
+
+Once Gymnasium and ``coramp`` are imported, ``gymnasium.make("coramp/Merge-v1")`` makes one.
+"""
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from coramp.coordination.asking import AskingLoop
+from coramp.coordination.guard import LONGEST_PERIOD_S
+from coramp.demand.arrivals import arrivals_of
+from coramp.errors import CorampError
+from coramp.kinematics.trajectory import station_and_speed
+from coramp.messages.feed import RequestFeed
+from coramp.scenarios.loading import load_scenario
+from coramp.strategies.asked_slot import crossings_around
+from coramp.strategies.base import steps_of_period
+
+Floats32 = npt.NDArray[np.float32]
+
+EACH_SIDE = 3
+"""So many vehicles that cross before the agent are seen, and so many that cross after it."""
+FEATURES = 6 + 2 * EACH_SIDE
+LATE_S, QUEUE_VEH, REFUSALS, OUTSIDE_S = 60.0, 10.0, 10.0, 10.0
+"""What counts as 1 in an observation."""
+FIRST_DRAWN, LAST_DRAWN = 1_000_000, 2**31 - 1
+"""Seeds of traffic that a reset without a seed draws from: smaller ones stay unseen."""
+MOST_DRAWS = 1000
+"""So often traffic is drawn anew for an episode before there is taken to be no agent at all."""
+
+
+class MergeSlots(gymnasium.Env[Floats32, Floats32]):
+    """Merging in the exact engine; a step is one decision of one ramp vehicle.
+
+    **Agents.** Every ramp vehicle in turn, by one policy: the foremost that has no merge yet. It is
+    asked for the first time as late as nobody on the mainline crosses after it in free movement,
+    and then every ``period_s`` until it has a merge.
+
+    **Action**, shape (1,), from -1 to 1: by how much later than in free movement it wants to cross
+    the nose, from 0 to ``longest_shift_s``. It is driven into that slot if that is safe, without
+    moving anybody who is on the mainline; who has yet to enter brakes as it enters, or waits. A
+    slot that is not safe is refused. -1 asks for nothing.
+
+    **Fallback.** A vehicle that has been asked and has no merge merges by itself, tried at every
+    step of the control clock, as soon as that is safe and holds nobody up who has yet to enter.
+    Until then it goes on to its stop before the nose. So an agent that asks for nothing merges too.
+
+    **Observation**, shape (12,), from -1 to 1: how late the agent would be in free movement (60 s);
+    its station (0 at the nose, -1 at the ramp's start) and speed (v0); its refusals (10); ramp
+    vehicles behind it (10); how long the first vehicle outside the mainline has waited (10 s); how
+    long after the three vehicles that cross before it its free movement crosses, the latest first,
+    and how long before the three after it, negative, the earliest first (``longest_shift_s``). In
+    brackets: what counts as 1. All is cut off there, and who is not there counts as 1 or -1.
+
+    **Reward** of a step: minus the delay (s) that all vehicles have got since the step before, over
+    the number of vehicles in the episode. So an episode's sum is minus the mean delay of all.
+
+    **End.** Terminated once everybody has entered and has a merge, truncated after ``longest_s``.
+    ``reset(seed=n)`` gives the arrivals of ``coramp run --seed n``; without a seed traffic is drawn
+    from seeds above a million. ``info`` has ``time_s``, ``row``, the agent's row in the ledger of
+    ``loop.coordinator`` (-1 for none), ``refused``, how many slots so far, and ``delay_s``, the
+    mean delay of all so far.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
+
+    def __init__(
+        self,
+        scenario: str = "paper",
+        *,
+        mainline_veh_h: float = 1800.0,
+        ramp_veh_h: float = 500.0,
+        time_gap_s: float = 1.0,
+        horizon_s: float = 300.0,
+        period_s: float = 1.0,
+        longest_shift_s: float = 6.0,
+        longest_s: float = 3600.0,
+    ) -> None:
+        """Raises CorampError for a scenario or number that cannot be."""
+        _check(period_s, longest_shift_s, longest_s)
+        settings = {
+            "mainline.flow_veh_h": mainline_veh_h,
+            "ramp.flow_veh_h": ramp_veh_h,
+            "safety.time_gap_s": time_gap_s,
+            "simulation.horizon_s": horizon_s,
+        }
+        self._scenario = load_scenario(scenario, {k: float(v) for k, v in settings.items()})
+        if self._scenario.vehicles_differ:
+            raise CorampError(
+                f"vehicle: the environment is for vehicles that are alike; those of {scenario} are "
+                "not; allowed are types without limits of their own"
+            )
+        self._rules = self._scenario.rules()
+        step_s = self._rules.control.step_s
+        self._period = steps_of_period(period_s, step_s)
+        self._longest_shift_s, self._last_step = longest_shift_s, round(longest_s / step_s)
+        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+        self.observation_space = spaces.Box(-1.0, 1.0, (FEATURES,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats32, dict[str, Any]]:
+        """Returns the first observation: a ramp vehicle is asked for its slot."""
+        super().reset(seed=seed, options=options)
+        traffic = self._drawn() if seed is None else seed
+        for _ in range(MOST_DRAWS):
+            self._begin(traffic)
+            if self.loop.row >= 0:
+                return self._observation(), self._info()
+            traffic = self._drawn()
+        raise CorampError(
+            f"ramp_veh_h: no ramp vehicle came in {MOST_DRAWS} draws of "
+            f"{self._scenario.simulation.horizon_s:g} s; allowed are flows and horizons with "
+            "somebody on the ramp"
+        )
+
+    def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
+        """Asks for the agent's slot and drives on to the next question; see the class."""
+        share = float(np.asarray(action, np.float64).reshape(-1)[0])
+        if not math.isfinite(share):
+            raise CorampError("action: holds a number that is not finite")
+        if share > -1.0:
+            self.loop.ask_for(0.5 * (min(share, 1.0) + 1.0) * self._longest_shift_s)
+        self.loop.go_on(self._last_step)
+        before_s, self._delay_s = self._delay_s, self.loop.delay_s()
+        reward = (before_s - self._delay_s) / len(self.arrivals)
+        over = self.loop.step >= self._last_step
+        return self._observation(), reward, self.loop.row < 0 and not over, over, self._info()
+
+    def _drawn(self) -> int:
+        return int(self.np_random.integers(FIRST_DRAWN, LAST_DRAWN))
+
+    def _begin(self, traffic: int) -> None:
+        """Starts on new traffic and drives on to the first question, if there is one."""
+        self.arrivals = arrivals_of(self._scenario, traffic)
+        self.loop = AskingLoop(
+            self._rules,
+            RequestFeed(self.arrivals),
+            self._scenario.fastest_mainline_entry_mps,
+            self._period,
+        )
+        self._delay_s = 0.0
+        self.loop.go_on(self._last_step)
+
+    def _observation(self) -> Floats32:
+        """Returns what the agent sees, zeros without one."""
+        loop, row, features = self.loop, self.loop.row, np.zeros(FEATURES)
+        if row < 0:
+            return features.astype(np.float32)
+        coordinator, road = loop.coordinator, self._rules.road
+        ledger, now_s = coordinator.ledger, loop.time_s
+        station_m, speed_mps = station_and_speed(ledger.way(row), now_s)
+        outside = coordinator.view((), loop.step).waiting
+        first = outside.first(on_ramp=False)
+        crossing_s, around_s = crossings_around(
+            ledger.fleet, row, now_s, EACH_SIDE, loop.packed_rules
+        )
+        features[:6] = (
+            loop.late_s(row) / LATE_S,
+            -station_m / road.ramp_start_m,
+            speed_mps / road.mainline_speed_mps,
+            loop.own_refused / REFUSALS,
+            (len(loop.waiting()) - 1) / QUEUE_VEH,
+            (now_s - outside.since_s[first]) / OUTSIDE_S if first >= 0 else 0.0,
+        )
+        features[6:] = (crossing_s - around_s) / self._longest_shift_s
+        return np.clip(features, -1.0, 1.0).astype(np.float32)
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "time_s": self.loop.time_s,
+            "row": self.loop.row,
+            "refused": self.loop.refused,
+            "delay_s": self._delay_s / len(self.arrivals),
+        }
+
+
+def _check(period_s: float, longest_shift_s: float, longest_s: float) -> None:
+    """Raises CorampError with a line for each setting that cannot be."""
+    wrong = {
+        f"period_s: {period_s:g} cannot be; allowed is above 0, up to {LONGEST_PERIOD_S:g}": not (
+            0.0 < period_s <= LONGEST_PERIOD_S
+        ),
+        f"longest_shift_s: {longest_shift_s:g} cannot be; allowed is above 0, up to 60": not (
+            0.0 < longest_shift_s <= 60.0
+        ),
+        f"longest_s: {longest_s:g} cannot be; allowed is above 0": not 0.0 < longest_s < math.inf,
+    }
+    if told := [line for line, is_wrong in wrong.items() if is_wrong]:
+        raise CorampError(*told)

@@ -1,0 +1,63 @@
+"""Slots that somebody else asks for: what a ramp vehicle sees of the lane, and the way to a slot.
+
+A slot is a crossing time c, as in ``slots``: a vehicle that cruises at v0 on intercept ``-v0 c``.
+"""
+
+import math
+
+import numpy as np
+
+from coramp._kernel import FloatArray, kernel
+from coramp.road.rules import unpacked
+from coramp.strategies.situation import assess
+from coramp.strategies.slot_onto_lane import ROOM, Place, merge_in_slot
+from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
+
+
+@kernel
+def crossings_around(
+    fleet: Fleet, row: int, now_s: float, each_side: int, packed_rules: FloatArray
+) -> tuple[float, FloatArray]:
+    """Returns when (s) a ramp vehicle crosses in free movement, and who crosses around that.
+
+    The latter are the crossing times (s) of so many vehicles with a place on the mainline that
+    cross before it, the latest of them first, and of as many that cross after it, the earliest
+    first. Where there is none the time is minus infinity before and infinity after it.
+    """
+    rules = unpacked(packed_rules)
+    v0 = rules.road.mainline_speed_mps
+    situation = assess(fleet, row, now_s, 0.0, rules)
+    intercepts_m = situation.intercepts_m
+    first_behind = 0
+    while first_behind < len(intercepts_m) and intercepts_m[first_behind] >= situation.free_m:
+        first_behind += 1
+    around_s = np.empty(2 * each_side)
+    around_s[:each_side], around_s[each_side:] = -math.inf, math.inf
+    for k in range(each_side):
+        if first_behind - 1 - k >= 0:
+            around_s[k] = -intercepts_m[first_behind - 1 - k] / v0
+        if first_behind + k < len(intercepts_m):
+            around_s[each_side + k] = -intercepts_m[first_behind + k] / v0
+    return -situation.free_m / v0, around_s
+
+
+@kernel
+def plan_into_slot(
+    fleet: Fleet, row: int, now_s: float, shift_s: float, packed_rules: FloatArray
+) -> Proposal:
+    """Returns a ramp vehicle's way into the slot ``shift_s`` after that of its free movement.
+
+    Nobody on the mainline moves for it; those behind it on the ramp brake where they must. The
+    proposal is empty where there is no such way that is safe: no other slot is tried.
+    """
+    rules = unpacked(packed_rules)
+    proposal = empty_proposal(ROOM)
+    situation = assess(fleet, row, now_s, 0.0, rules)
+    slot_m = situation.free_m - rules.road.mainline_speed_mps * shift_s
+    gap = 0
+    while gap < len(situation.order) and situation.intercepts_m[gap] >= slot_m:
+        gap += 1
+    place = Place(gap, slot_m, len(situation.order), 0.0)
+    if merge_in_slot(fleet, proposal, situation, place, rules).gap < 0:
+        proposal.size[0] = 0
+    return proposal
