@@ -4,6 +4,7 @@ Once Gymnasium and ``coramp`` are imported, ``gymnasium.make("coramp/Merge-v1")`
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -11,12 +12,15 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from coramp.coordination.asking import AskingLoop
+from coramp._kernel import FloatArray
+from coramp.coordination.asking import AskingLoop, Requested
 from coramp.coordination.guard import LONGEST_PERIOD_S
-from coramp.demand.arrivals import arrivals_of
+from coramp.demand.arrivals import Arrival, arrivals_of
 from coramp.errors import CorampError
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
+from coramp.metrics.delay_bound import earliest_exits_s, first_come_exits_s, lane_headway_s
+from coramp.road.rules import Rules, packed
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.asked_slot import crossings_around
 from coramp.strategies.base import steps_of_period
@@ -25,7 +29,7 @@ Floats32 = npt.NDArray[np.float32]
 
 EACH_SIDE = 3
 """So many vehicles that cross before the agent are seen, and so many that cross after it."""
-FEATURES = 6 + 2 * EACH_SIDE
+FEATURES = 7 + 2 * EACH_SIDE
 LATE_S, QUEUE_VEH, REFUSALS, OUTSIDE_S = 60.0, 10.0, 10.0, 10.0
 """What counts as 1 in an observation."""
 FIRST_DRAWN, LAST_DRAWN = 1_000_000, 2**31 - 1
@@ -77,8 +81,8 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
         ramp_veh_h: float = 500.0,
         time_gap_s: float = 1.0,
         horizon_s: float = 300.0,
-        period_s: float = 1.0,
-        longest_shift_s: float = 6.0,
+        period_s: float = 5.0,
+        longest_shift_s: float = 20.0,
         longest_s: float = 3600.0,
     ) -> None:
         """Raises CorampError for a scenario or number that cannot be."""
@@ -125,10 +129,10 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
         if not math.isfinite(share):
             raise CorampError("action: holds a number that is not finite")
         if share > -1.0:
-            self.loop.ask_for(0.5 * (min(share, 1.0) + 1.0) * self._longest_shift_s)
+            self.loop.ask_for((0.5 * (min(share, 1.0) + 1.0)) ** 2 * self._longest_shift_s)
         self.loop.go_on(self._last_step)
-        before_s, self._delay_s = self._delay_s, self.loop.delay_s()
-        reward = (before_s - self._delay_s) / len(self.arrivals)
+        before_s, self._lost_s = self._lost_s, self._lost_so_far_s()
+        reward = (before_s - self._lost_s) / len(self.arrivals)
         over = self.loop.step >= self._last_step
         return self._observation(), reward, self.loop.row < 0 and not over, over, self._info()
 
@@ -144,8 +148,14 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             self._scenario.fastest_mainline_entry_mps,
             self._period,
         )
-        self._delay_s = 0.0
+        self._served_s = served_delay_s(self.loop.requested, self.arrivals, self._rules)
+        self._lost_s = 0.0
         self.loop.go_on(self._last_step)
+
+    def _lost_so_far_s(self) -> float:
+        """Returns the delay (s) of all so far beyond that of the same vehicles in a queue."""
+        heard = self.loop.requested.scheduled_s <= self.loop.time_s
+        return self.loop.delay_s() - float(self._served_s[heard].sum())
 
     def _observation(self) -> Floats32:
         """Returns what the agent sees, zeros without one."""
@@ -168,7 +178,8 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             (len(loop.waiting()) - 1) / QUEUE_VEH,
             (now_s - outside.since_s[first]) / OUTSIDE_S if first >= 0 else 0.0,
         )
-        features[6:] = (crossing_s - around_s) / self._longest_shift_s
+        later_s = crossing_s - around_s
+        features[6:] = np.sign(later_s) * np.sqrt(np.abs(later_s) / self._longest_shift_s)
         return np.clip(features, -1.0, 1.0).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
@@ -176,8 +187,24 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             "time_s": self.loop.time_s,
             "row": self.loop.row,
             "refused": self.loop.refused,
-            "delay_s": self._delay_s / len(self.arrivals),
+            "delay_s": self.loop.delay_s() / len(self.arrivals),
         }
+
+
+def served_delay_s(requested: Requested, arrivals: Sequence[Arrival], rules: Rules) -> FloatArray:
+    """Returns each vehicle's delay (s) where the lane serves all first come, first served.
+
+    That is Lindley's recursion (``metrics.delay_bound``): it depends on the arrivals alone.
+    """
+    if not arrivals:
+        return np.empty(0)
+    entry_mps = np.array([a.speed_mps for a in arrivals])
+    shortest_m = min(a.length_m for a in arrivals)
+    earliest_s = earliest_exits_s(
+        requested.scheduled_s, requested.on_ramp, entry_mps, packed(rules)
+    )
+    exit_s = first_come_exits_s(earliest_s, lane_headway_s(shortest_m, rules))
+    return exit_s - requested.scheduled_s - requested.free_flow_s
 
 
 def _check(period_s: float, longest_shift_s: float, longest_s: float) -> None:

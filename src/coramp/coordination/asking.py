@@ -4,6 +4,7 @@ It pauses whenever somebody has to be asked. Who answers is outside: a policy, o
 """
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from coramp.coordination.book import ways_of
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.gate import NEVER, first_step_from
 from coramp.equations.ramp_acceleration import lag_m
+from coramp.equations.safe_distance import merge_clearance_m
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules, packed
 from coramp.strategies.asked_slot import plan_into_slot
@@ -24,7 +26,9 @@ from coramp.strategies.base import (
     FollowTrajectory,
     Memory,
     View,
+    steps_of_period,
 )
+from coramp.strategies.situation import lane_order
 from coramp.strategies.slot_onto_lane import crossing_of_s
 from coramp.strategies.slots import SLOWEST_ENTRY_SHARE, time_ahead_s
 from coramp.vehicles.fleet import proposed
@@ -72,9 +76,11 @@ class AskingLoop:
         self.packed_rules = packed(rules)
         self._rules, self._period = rules, period_steps
         self._step_s = rules.control.step_s
+        self._moving_up = steps_of_period(rules.control.retry_s, self._step_s)
         self._asked, self._again = -1, 0
+        self._clearance_m = merge_clearance_m(rules.road, rules.safety)
         self._ahead_s = time_ahead_s(self.coordinator.view((), 0))
-        self._requested = requested(feed, rules)
+        self.requested = requested(feed, rules)
 
     @property
     def time_s(self) -> float:
@@ -119,7 +125,7 @@ class AskingLoop:
                 return
             if len(waiting) == 0 and self._everybody_is_in():
                 return
-            until = min(due, self.step + self._period, last_step)
+            until = min(due, self.step + self._moving_up, last_step)
             if len(waiting) and waiting[0] == self._asked:
                 self._fall_back(waiting, until)
             self.coordinator.run(until)
@@ -129,14 +135,18 @@ class AskingLoop:
         """Returns the delay (s) that all vehicles together are known to have by now.
 
         Whose place on the mainline is committed leaves the zone as committed. Other ramp vehicles
-        would go on in free movement, and who waits outside has waited so far.
+        count as if they took the next slots behind all of these, in their order, and who waits
+        outside has waited so far.
         """
         ledger, (arrival, _) = self.coordinator.ledger, self.coordinator.entered()
-        asked, now_s = self._requested, self.time_s
+        asked, now_s = self.requested, self.time_s
         exit_s = ledger.book.exit_s[: len(ledger)].copy()
         v0, end_m = self._rules.road.mainline_speed_mps, self._rules.road.mainline_end_m
+        last_s = self._last_crossing_s()
         for row in self.waiting().tolist():
-            exit_s[row] = self.crossing_s(row) + end_m / v0
+            headway_s = (ledger.length_m(row) + self._clearance_m) / v0
+            last_s = max(self.crossing_s(row), last_s + headway_s)
+            exit_s[row] = last_s + end_m / v0
         inside_s = exit_s - (asked.scheduled_s + asked.free_flow_s)[arrival]
         outside = asked.scheduled_s <= now_s
         outside[arrival] = False
@@ -146,12 +156,18 @@ class AskingLoop:
         """Returns how late (s) a ramp vehicle without a merge would be in free movement."""
         k = self.coordinator.entered()[0][row]
         v0, end_m = self._rules.road.mainline_speed_mps, self._rules.road.mainline_end_m
-        asked = self._requested
+        asked = self.requested
         exit_s = self.crossing_s(row) + end_m / v0
         return float(exit_s - asked.scheduled_s[k] - asked.free_flow_s[k])
 
+    def _last_crossing_s(self) -> float:
+        """Returns when (s) the last vehicle with a place on the mainline crosses."""
+        fleet, v0 = self.coordinator.ledger.fleet, self._rules.road.mainline_speed_mps
+        _, intercepts_m = lane_order(fleet, -1, v0)
+        return float(-intercepts_m[-1] / v0) if len(intercepts_m) else -math.inf
+
     def _everybody_is_in(self) -> bool:
-        return len(self.coordinator.ledger) == len(self._requested.scheduled_s)
+        return len(self.coordinator.ledger) == len(self.requested.scheduled_s)
 
     def _due_step(self, waiting: IntArray) -> int:
         """Returns when the foremost ramp vehicle is to be asked."""
@@ -169,16 +185,15 @@ class AskingLoop:
         self._again = self.step + self._period
 
     def _fall_back(self, waiting: IntArray, until: int) -> None:
-        """Has ramp vehicles merge by themselves, or move up, in each step before that one."""
+        """Has the foremost merge by itself in each step before that one; others move up once."""
+        drive = partial(DriveWithAcceleration, accel_mps2=0.0, hold_s=AT_ONCE_S)
         rows = waiting.tolist()
-        for step in range(self.step, until):
-            self.coordinator.run(step)
-            commands = [DriveWithAcceleration(row, 0.0, AT_ONCE_S) for row in rows]
-            self.coordinator.drive(commands, step)
-            merge_s = self.coordinator.ledger.merge_time_s
-            rows = [row for row in rows if merge_s(row) == math.inf]
-            if not rows:
+        self.coordinator.drive([drive(row) for row in rows], self.step)
+        for step in range(self.step + 1, until):
+            if self.coordinator.ledger.merge_time_s(rows[0]) < math.inf:
                 return
+            self.coordinator.run(step)
+            self.coordinator.drive([drive(rows[0])], step)
 
 
 def requested(feed: RequestFeed, rules: Rules) -> Requested:

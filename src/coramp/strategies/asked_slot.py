@@ -22,7 +22,8 @@ def crossings_around(
 
     The latter are the crossing times (s) of so many vehicles with a place on the mainline that
     cross before it, the latest of them first, and of as many that cross after it, the earliest
-    first. Where there is none the time is minus infinity before and infinity after it.
+    first; then that of the last of all. Where there is none the time is minus infinity before,
+    and for the last of all, and infinity after it.
     """
     rules = unpacked(packed_rules)
     v0 = rules.road.mainline_speed_mps
@@ -31,8 +32,9 @@ def crossings_around(
     first_behind = 0
     while first_behind < len(intercepts_m) and intercepts_m[first_behind] >= situation.free_m:
         first_behind += 1
-    around_s = np.empty(2 * each_side)
+    around_s = np.empty(2 * each_side + 1)
     around_s[:each_side], around_s[each_side:] = -math.inf, math.inf
+    around_s[2 * each_side] = -intercepts_m[-1] / v0 if len(intercepts_m) else -math.inf
     for k in range(each_side):
         if first_behind - 1 - k >= 0:
             around_s[k] = -intercepts_m[first_behind - 1 - k] / v0
