@@ -32,6 +32,8 @@ EACH_SIDE = 3
 FEATURES = 7 + 2 * EACH_SIDE
 LATE_S, QUEUE_VEH, REFUSALS, OUTSIDE_S = 60.0, 10.0, 10.0, 10.0
 """What counts as 1 in an observation."""
+TOLERANCE_S = 1.0
+"""So much later than it asks for an agent may be given a slot."""
 FIRST_DRAWN, LAST_DRAWN = 1_000_000, 2**31 - 1
 """Seeds of traffic that a reset without a seed draws from: smaller ones stay unseen."""
 MOST_DRAWS = 1000
@@ -82,7 +84,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
         time_gap_s: float = 1.0,
         horizon_s: float = 300.0,
         period_s: float = 5.0,
-        longest_shift_s: float = 20.0,
+        longest_shift_s: float = 10.0,
         longest_s: float = 3600.0,
     ) -> None:
         """Raises CorampError for a scenario or number that cannot be."""
@@ -129,7 +131,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
         if not math.isfinite(share):
             raise CorampError("action: holds a number that is not finite")
         if share > -1.0:
-            self.loop.ask_for((0.5 * (min(share, 1.0) + 1.0)) ** 2 * self._longest_shift_s)
+            self.loop.ask_for(0.5 * (min(share, 1.0) + 1.0) * self._longest_shift_s, TOLERANCE_S)
         self.loop.go_on(self._last_step)
         before_s, self._lost_s = self._lost_s, self._lost_so_far_s()
         reward = (before_s - self._lost_s) / len(self.arrivals)
@@ -178,8 +180,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             (len(loop.waiting()) - 1) / QUEUE_VEH,
             (now_s - outside.since_s[first]) / OUTSIDE_S if first >= 0 else 0.0,
         )
-        later_s = crossing_s - around_s
-        features[6:] = np.sign(later_s) * np.sqrt(np.abs(later_s) / self._longest_shift_s)
+        features[6:] = (crossing_s - around_s) / self._longest_shift_s
         return np.clip(features, -1.0, 1.0).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:

@@ -96,10 +96,12 @@ class AskingLoop:
         fleet = self.coordinator.ledger.fleet
         return float(crossing_of_s(fleet, row, self.time_s, self.packed_rules))
 
-    def ask_for(self, shift_s: float) -> bool:
-        """Commits who is asked to the slot so much after free movement's; False if not safe."""
+    def ask_for(self, shift_s: float, tolerance_s: float) -> bool:
+        """Commits who is asked to a slot so much after free movement's; False where none is safe."""
         ledger = self.coordinator.ledger
-        proposal = plan_into_slot(ledger.fleet, self.row, self.time_s, shift_s, self.packed_rules)
+        proposal = plan_into_slot(
+            ledger.fleet, self.row, self.time_s, shift_s, tolerance_s, self.packed_rules
+        )
         commands = tuple(
             FollowTrajectory(
                 int(proposal.rows[k]), proposed(proposal, k).copy(), float(proposal.merge_time_s[k])

@@ -9,9 +9,12 @@ import numpy as np
 
 from coramp._kernel import FloatArray, kernel
 from coramp.road.rules import unpacked
-from coramp.strategies.situation import assess
+from coramp.strategies.situation import assess, bounds_between_m
 from coramp.strategies.slot_onto_lane import ROOM, Place, merge_in_slot
 from coramp.vehicles.fleet import Fleet, Proposal, empty_proposal
+
+TRIED_EVERY_S = 0.1
+"""How far apart the slots are that are tried."""
 
 
 @kernel
@@ -45,21 +48,36 @@ def crossings_around(
 
 @kernel
 def plan_into_slot(
-    fleet: Fleet, row: int, now_s: float, shift_s: float, packed_rules: FloatArray
+    fleet: Fleet,
+    row: int,
+    now_s: float,
+    shift_s: float,
+    tolerance_s: float,
+    packed_rules: FloatArray,
 ) -> Proposal:
-    """Returns a ramp vehicle's way into the slot ``shift_s`` after that of its free movement.
+    """Returns a ramp vehicle's way into a slot ``shift_s`` after that of its free movement.
 
+    It is the first that is safe of those up to ``tolerance_s`` later, ``TRIED_EVERY_S`` apart.
     Nobody on the mainline moves for it; those behind it on the ramp brake where they must. The
-    proposal is empty where there is no such way that is safe: no other slot is tried.
+    proposal is empty where none is safe.
     """
     rules = unpacked(packed_rules)
     proposal = empty_proposal(ROOM)
     situation = assess(fleet, row, now_s, 0.0, rules)
-    slot_m = situation.free_m - rules.road.mainline_speed_mps * shift_s
-    gap = 0
-    while gap < len(situation.order) and situation.intercepts_m[gap] >= slot_m:
-        gap += 1
-    place = Place(gap, slot_m, len(situation.order), 0.0)
-    if merge_in_slot(fleet, proposal, situation, place, rules).gap < 0:
-        proposal.size[0] = 0
+    order, intercepts_m = situation.order, situation.intercepts_m
+    own_m, clearance_m = fleet.length_m[row] + situation.clearance_m, situation.clearance_m
+    for k in range(int(tolerance_s / TRIED_EVERY_S + 1e-9) + 1):
+        slot_m = situation.free_m - rules.road.mainline_speed_mps * (shift_s + k * TRIED_EVERY_S)
+        gap = 0
+        while gap < len(order) and intercepts_m[gap] >= slot_m:
+            gap += 1
+        low_m, high_m = bounds_between_m(
+            order, intercepts_m, fleet.length_m, gap, -math.inf, own_m, clearance_m
+        )
+        if not low_m <= slot_m <= high_m:
+            continue
+        place = Place(gap, slot_m, len(order), 0.0)
+        if merge_in_slot(fleet, proposal, situation, place, rules).gap >= 0:
+            return proposal
+    proposal.size[0] = 0
     return proposal
