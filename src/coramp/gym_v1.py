@@ -30,7 +30,7 @@ Floats32 = npt.NDArray[np.float32]
 EACH_SIDE = 3
 """So many vehicles that cross before the agent are seen, and so many that cross after it."""
 FEATURES = 7 + 2 * EACH_SIDE
-LATE_S, QUEUE_VEH, REFUSALS, OUTSIDE_S = 60.0, 10.0, 10.0, 10.0
+LATE_S, QUEUE_VEH, REFUSALS, OUTSIDE_S, AROUND_S = 60.0, 10.0, 10.0, 10.0, 5.0
 """What counts as 1 in an observation."""
 TOLERANCE_S = 1.0
 """So much later than it asks for an agent may be given a slot."""
@@ -180,7 +180,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             (len(loop.waiting()) - 1) / QUEUE_VEH,
             (now_s - outside.since_s[first]) / OUTSIDE_S if first >= 0 else 0.0,
         )
-        features[6:] = (crossing_s - around_s) / self._longest_shift_s
+        features[6:] = (crossing_s - around_s) / AROUND_S
         return np.clip(features, -1.0, 1.0).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
