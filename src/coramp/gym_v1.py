@@ -15,7 +15,8 @@ from gymnasium import spaces
 from coramp._kernel import FloatArray
 from coramp.coordination.asking import AskingLoop, Requested
 from coramp.coordination.guard import LONGEST_PERIOD_S
-from coramp.demand.arrivals import Arrival, arrivals_of
+from coramp.coordination.plant import Arrival
+from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
@@ -48,29 +49,33 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
     and then every ``period_s`` until it has a merge.
 
     **Action**, shape (1,), from -1 to 1: by how much later than in free movement it wants to cross
-    the nose, from 0 to ``longest_shift_s``. It is driven into that slot if that is safe, without
-    moving anybody who is on the mainline; who has yet to enter brakes as it enters, or waits. A
-    slot that is not safe is refused. -1 asks for nothing.
+    the nose, from 0 to ``longest_shift_s``. It gets the first slot up to 1 s after that which is
+    safe, and for which nobody on the mainline has to move; who has yet to enter brakes as it
+    enters, or waits. If there is none the wish is refused. -1 asks for nothing.
 
     **Fallback.** A vehicle that has been asked and has no merge merges by itself, tried at every
     step of the control clock, as soon as that is safe and holds nobody up who has yet to enter.
     Until then it goes on to its stop before the nose. So an agent that asks for nothing merges too.
 
-    **Observation**, shape (12,), from -1 to 1: how late the agent would be in free movement (60 s);
+    **Observation**, shape (13,), from -1 to 1: how late the agent would be in free movement (60 s);
     its station (0 at the nose, -1 at the ramp's start) and speed (v0); its refusals (10); ramp
-    vehicles behind it (10); how long the first vehicle outside the mainline has waited (10 s); how
-    long after the three vehicles that cross before it its free movement crosses, the latest first,
-    and how long before the three after it, negative, the earliest first (``longest_shift_s``). In
-    brackets: what counts as 1. All is cut off there, and who is not there counts as 1 or -1.
+    vehicles behind it (10); how long the first vehicle outside the mainline has waited (10 s); then
+    how long after others its free movement crosses (5 s), negative for before: the three before it,
+    the latest first, the three after it, the earliest first, and the last of all. In brackets: what
+    counts as 1. All is cut off there, and who is not there counts as 1, or -1 if it were behind.
+    Zeros without an agent.
 
     **Reward** of a step: minus the delay (s) that all vehicles have got since the step before, over
-    the number of vehicles in the episode. So an episode's sum is minus the mean delay of all.
+    the number of vehicles in the episode. A ramp vehicle without a merge counts as if it took the
+    next slot behind all others. What the same vehicles lose in a queue that serves the first to
+    come first is taken off as they come: that depends on the arrivals alone, and without it chance
+    drowns what an action does. So an episode's sum is that queue's mean delay minus the episode's.
 
     **End.** Terminated once everybody has entered and has a merge, truncated after ``longest_s``.
     ``reset(seed=n)`` gives the arrivals of ``coramp run --seed n``; without a seed traffic is drawn
     from seeds above a million. ``info`` has ``time_s``, ``row``, the agent's row in the ledger of
-    ``loop.coordinator`` (-1 for none), ``refused``, how many slots so far, and ``delay_s``, the
-    mean delay of all so far.
+    ``loop.coordinator`` (-1 for none), ``refused``, how many wishes so far, and ``delay_s``, the
+    mean delay of all so far; after the end that of the episode.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own attribute
@@ -105,6 +110,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
         step_s = self._rules.control.step_s
         self._period = steps_of_period(period_s, step_s)
         self._longest_shift_s, self._last_step = longest_shift_s, round(longest_s / step_s)
+        self._lost_s = 0.0
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
         self.observation_space = spaces.Box(-1.0, 1.0, (FEATURES,), np.float32)
 

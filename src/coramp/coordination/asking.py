@@ -97,7 +97,10 @@ class AskingLoop:
         return float(crossing_of_s(fleet, row, self.time_s, self.packed_rules))
 
     def ask_for(self, shift_s: float, tolerance_s: float) -> bool:
-        """Commits who is asked to a slot so much after free movement's; False where none is safe."""
+        """Commits who is asked to a slot after free movement's; False where none is safe.
+
+        It is the first safe one from ``shift_s`` to ``shift_s + tolerance_s`` later.
+        """
         ledger = self.coordinator.ledger
         proposal = plan_into_slot(
             ledger.fleet, self.row, self.time_s, shift_s, tolerance_s, self.packed_rules
