@@ -45,8 +45,9 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
     """Merging in the exact engine; a step is one decision of one ramp vehicle.
 
     **Agents.** Every ramp vehicle in turn, by one policy: the foremost that has no merge yet. It is
-    asked for the first time as late as nobody on the mainline crosses after it in free movement,
-    and then every ``period_s`` until it has a merge.
+    first asked so long before its crossing in free movement as the mainline takes from its start to
+    the nose, when nobody who entered there at v0 crosses after it yet, and then every ``period_s``
+    until it has a merge.
 
     **Action**, shape (1,), from -1 to 1: by how much later than in free movement it wants to cross
     the nose, from 0 to ``longest_shift_s``. It gets the first slot up to 1 s after that which is

@@ -58,10 +58,11 @@ class Requested(NamedTuple):
 class AskingLoop:
     """A coordinator that stops where a ramp vehicle is to be asked for its slot.
 
-    Asked is the foremost ramp vehicle without a merge: for the first time as late as nobody on the
-    mainline crosses after it in free movement, and every ``period_steps`` from then on. ``row`` is
-    that vehicle, -1 where nobody will be asked any more. ``refused`` counts slots that were not
-    safe, ``own_refused`` those of the vehicle that is asked.
+    Asked is the foremost ramp vehicle without a merge. The first time is so long before its crossing
+    in free movement as the mainline takes from its start to the nose (``slots.time_ahead_s``), the
+    next ones follow every ``period_steps``. ``row`` is that vehicle, -1 where nobody will be asked
+    any more. ``refused`` counts wishes for which no slot was safe, ``own_refused`` those of the
+    vehicle that is asked.
 
     From the first question on, the vehicle merges by itself in each step in which that is safe and
     holds nobody up who has yet to enter; until then it goes on to its stop, and so do those behind.
