@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 
 import coramp
+import coramp.gym  # registers the environment
 
 HERE = Path(__file__).parent
 ENVIRONMENT = "coramp/Merge-v1"
@@ -129,6 +130,16 @@ def at_random(random):
     return lambda _: random.uniform(-1.0, 1.0, 1)
 
 
+def behind_everybody(later_s=0.0):
+    """Returns the rule that asks for the slot a headway behind the last of the lane, or later."""
+
+    def policy(seen):
+        shift_s = max(0.0, 1.26 + later_s - 5.0 * seen[-1])
+        return np.array([np.clip(shift_s / 5.0 - 1.0, -0.999, 1.0)])
+
+    return policy
+
+
 def stored(seed):
     """Returns what ``train SEED`` wrote: the network and its curve."""
     return json.loads((HERE / f"policy-{seed}.json").read_text(encoding="utf-8"))
@@ -142,6 +153,8 @@ def judged(seeds=JUDGED):
     policies["random actions"] = at_random(np.random.default_rng(0))
     for seed in (1, 2, 3):
         policies[f"trained, seed {seed}"] = network(stored(seed)["layers"])
+    policies["rule: behind everybody"] = behind_everybody()
+    policies["the same, 0.3 s later"] = behind_everybody(0.3)
     found = {name: [delay_s(env, policy, k) for k in seeds] for name, policy in policies.items()}
     return {**found, "slots": [slots_delay_s(k) for k in seeds]}
 

@@ -58,7 +58,7 @@ class Requested(NamedTuple):
 class AskingLoop:
     """A coordinator that stops where a ramp vehicle is to be asked for its slot.
 
-    Asked is the foremost ramp vehicle without a merge. The first time is so long before its crossing
+    Asked is the foremost ramp vehicle without a merge. The first time is so long before it crosses
     in free movement as the mainline takes from its start to the nose (``slots.time_ahead_s``), the
     next ones follow every ``period_steps``. ``row`` is that vehicle, -1 where nobody will be asked
     any more. ``refused`` counts wishes for which no slot was safe, ``own_refused`` those of the
