@@ -16,7 +16,7 @@ DECISIONS_A_SECOND_AT_LEAST = 200
 
 @pytest.mark.parametrize("agents", ["one", "all"])
 def test_steps_a_second(benchmark, agents):
-    env = gymnasium.make("coramp/Merge-v0", agents=agents)
+    env = gymnasium.make(gymnasium.spec("coramp/Merge-v0"), agents=agents)
     random = np.random.default_rng(1)
     actions = random.uniform(-0.3, 0.5, (STEPS, *env.action_space.shape))
 
