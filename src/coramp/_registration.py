@@ -1,13 +1,19 @@
-"""Tells Gymnasium of coramp's environment, without importing what that needs."""
+"""Tells Gymnasium of coramp's environments, without importing what they need."""
 
 import sys
 from typing import Any
 
-ENVIRONMENT = "coramp/Merge-v0"
+ENVIRONMENTS = {
+    "coramp/Merge-v0": "coramp.gym:MergeEnv",
+    "coramp/Merge-v1": "coramp.gym_v1:MergeSlots",
+}
 
 
 def register() -> None:
-    """Registers the environment where Gymnasium is imported already and does not know it."""
+    """Registers the environments where Gymnasium is imported already and does not know them."""
     gymnasium: Any = sys.modules.get("gymnasium")
-    if gymnasium is not None and ENVIRONMENT not in gymnasium.registry:
-        gymnasium.register(id=ENVIRONMENT, entry_point="coramp.gym:MergeEnv")
+    if gymnasium is None:
+        return
+    for name, entry_point in ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(id=name, entry_point=entry_point)

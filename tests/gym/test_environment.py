@@ -19,7 +19,13 @@ BUSY = {"mainline_veh_h": 2400.0, "ramp_veh_h": 900.0}
 
 
 def made(**settings):
-    return gymnasium.make("coramp/Merge-v0", **settings).unwrapped
+    return gymnasium.make(gymnasium.spec("coramp/Merge-v0"), **settings).unwrapped
+
+
+def test_by_its_name_it_is_made_with_gymnasiums_warning_that_there_is_a_v1():
+    with pytest.warns(DeprecationWarning, match="Merge-v0 is out of date"):
+        env = gymnasium.make("coramp/Merge-v0")
+    assert isinstance(env.unwrapped, coramp.gym.MergeEnv)
 
 
 @pytest.mark.parametrize("agents", ["one", "all"])
