@@ -13,10 +13,11 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.admission import undecided_in_lane_order
 from coramp.coordination.book import ways_of
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.gate import NEVER, first_step_from
+from coramp.coordination.gate import NEVER
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import merge_clearance_m
 from coramp.messages.feed import RequestFeed
+from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, packed
 from coramp.strategies.asked_slot import plan_into_slot
 from coramp.strategies.base import (
@@ -32,6 +33,7 @@ from coramp.strategies.situation import lane_order
 from coramp.strategies.slot_onto_lane import crossing_of_s
 from coramp.strategies.slots import SLOWEST_ENTRY_SHARE, time_ahead_s
 from coramp.vehicles.fleet import proposed
+from coramp.vehicles.merge_state import is_planned
 
 AT_ONCE_S = 1e-6
 """The fallback holds no acceleration: who stands and is told so anew would stand for ever."""
@@ -114,7 +116,7 @@ class AskingLoop:
         )
         if commands:
             self.coordinator.carry_out(Decision(commands), (self.row,), self.step)
-        if ledger.merge_time_s(self.row) < math.inf:
+        if is_planned(ledger.merge_time_s(self.row)):
             return True
         self.refused += 1
         self.own_refused += 1
@@ -196,7 +198,7 @@ class AskingLoop:
         rows = waiting.tolist()
         self.coordinator.drive([drive(row) for row in rows], self.step)
         for step in range(self.step + 1, until):
-            if self.coordinator.ledger.merge_time_s(rows[0]) < math.inf:
+            if is_planned(self.coordinator.ledger.merge_time_s(rows[0])):
                 return
             self.coordinator.run(step)
             self.coordinator.drive([drive(rows[0])], step)
