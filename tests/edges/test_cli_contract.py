@@ -400,7 +400,7 @@ def test_demand_above_the_lanes_limit_is_said_beforehand():
     "arguments",
     [
         (*ABOVE, "--set", "safety.time_gap_s=1.0"),  # 2,864 veh/h
-        ("run", "paper", *GAPS, "-s", "uncontrolled", "--mainline", "2000", "--ramp", "700"),
+        ("run", "paper", "-s", "uncontrolled", "--mainline", "2000", "--ramp", "700"),
     ],
 )
 def test_demand_is_not_spoken_of_below_the_limit_or_with_drivers(arguments):

@@ -1,6 +1,7 @@
 """What can be said of a run before it: whether more arrive than the lane carries."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
 from coramp.runs.running import RunSpec
@@ -41,20 +42,25 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
 
 def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
     """Returns in a line which settings of runs with drivers change nothing for them, or None."""
-    found = {
-        key: spec.drivers
-        for spec in specs
-        if spec.drivers is not None
-        for key, _ in spec.overrides
-        if key.startswith(OF_AUTOMATION)
-    }
+    of_drivers = [spec for spec in specs if spec.drivers is not None]
+    found = of_automation([dict(spec.overrides) for spec in of_drivers])
     if not found:
         return None
-    keys, population = ", ".join(found), next(reversed(found.values()))
+    keys, population = ", ".join(found), of_drivers[0].drivers
     return (
         f"{keys}: changes nothing for drivers; what they keep is drivers.{population}.tau_s and "
         f"drivers.{population}.min_gap_m"
     )
+
+
+def of_automation(settings: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Returns which settings of runs with drivers bind vehicles that are commanded, and no drivers.
+
+    Of a single run that is all such; of several those alone in which they differ.
+    """
+    keys = {key: None for found in settings for key in found if key.startswith(OF_AUTOMATION)}
+    values = {key: {str(found.get(key)) for found in settings} for key in keys}
+    return [key for key in keys if len(settings) == 1 or len(values[key]) > 1]
 
 
 def seeds_without_effect(specs: Sequence[RunSpec]) -> str | None:

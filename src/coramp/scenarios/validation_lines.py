@@ -8,7 +8,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from coramp.scenarios.speeds_kmh import KEYS, in_mps
+from coramp.road.streams import STREAMS
+from coramp.scenarios.speeds_kmh import KEYS, LIST, in_mps
 
 Location = tuple[int | str, ...]
 SHAPES = ("(one)", "(list)")
@@ -180,7 +181,8 @@ def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
             model = inner
         elif not isinstance(part, int):
             model = _model_within(inner) or model
-    in_kmh = [kmh for kmh, mps in KEYS.items() if mps in model.model_fields]
+    scenario = location[0] in (*STREAMS, LIST)
+    in_kmh = [kmh for kmh, mps in KEYS.items() if scenario and mps in model.model_fields]
     return sorted([*model.model_fields, *in_kmh])
 
 

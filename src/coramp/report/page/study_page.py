@@ -24,7 +24,7 @@ from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
 from coramp.report.varied_figure import readable, varied_figure
-from coramp.runs.expected_queue import OF_AUTOMATION
+from coramp.runs.expected_queue import of_automation
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.overrides import overrides_of
@@ -188,8 +188,7 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
 def _without_effect(runs: pl.DataFrame) -> list[str]:
     """The settings of runs with drivers that bind commanded vehicles alone."""
     of_drivers = runs.filter(pl.col("drivers").is_not_null()).iter_rows(named=True)
-    keys = {key: None for row in of_drivers for key in overrides_of(row)}
-    return [key for key in keys if key.startswith(OF_AUTOMATION)]
+    return of_automation([overrides_of(row) for row in of_drivers])
 
 
 def _failed(runs: pl.DataFrame) -> Table | None:
