@@ -49,6 +49,7 @@ def captions(text):
 def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
     text = report(folder).read_text()
     at = "at 900 + 400 veh/h, safety.time_gap_s=0.6"
+    assert re.search(r"horizon of a run \(s\)</td><td[^>]*>60</td>", text)
     assert captions(text) == [
         "Mean delay over what varies, with 95 % intervals over seeds",
         f"Mean speed over time {at}",

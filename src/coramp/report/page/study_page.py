@@ -116,12 +116,12 @@ def _asked(study: Study, good: pl.DataFrame, content: Row, unit: SpeedUnit) -> T
         ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
-        *_road(content["scenario"], unit),
+        *_road(content["scenario"], unit, study.horizon_s),
     )
     return Table("What was computed", ("what", "value"), rows)
 
 
-def _road(scenario: Row, unit: SpeedUnit) -> list[tuple[str, str]]:
+def _road(scenario: Row, unit: SpeedUnit, horizon_s: float | None) -> list[tuple[str, str]]:
     """The scenario's road and gaps, as far as runs do not set them."""
     mainline, ramp, safety = (scenario[name] for name in ("mainline", "ramp", "safety"))
     speeds = (unit.of(stream["speed_mps"]) for stream in (mainline, ramp))
@@ -130,7 +130,7 @@ def _road(scenario: Row, unit: SpeedUnit) -> list[tuple[str, str]]:
         ("acceleration lane (m)", f"{ramp['acceleration_lane_m']:g}"),
         ("time gap (s)", f"{safety['time_gap_s']:g}"),
         ("standstill gap (m)", f"{safety['standstill_gap_m']:g}"),
-        ("horizon of a run (s)", f"{scenario['simulation']['horizon_s']:g}"),
+        ("horizon of a run (s)", f"{horizon_s or scenario['simulation']['horizon_s']:g}"),
     ]
 
 
