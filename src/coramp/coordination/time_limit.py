@@ -74,8 +74,9 @@ def _by_alarm(longest_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, _nothing if before is signal.SIG_DFL else before)
 
 
-LEAVING_FRAMES = 3
-"""So many frames leaving the block may take, on top of those that entering it took."""
+LEAVING_FRAMES = 6
+"""So many frames leaving the block may take, on top of those that entering it took: those of the
+context managers, and those of another alarm that comes meanwhile."""
 
 
 def _lower_recursion_limit(lowest: int) -> None:
