@@ -14,7 +14,8 @@ from benchmarks.simulation import plain_sumo_s, simulation_clock
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
-from coramp.worlds.sumo.engine import SumoOptions, run_cooperative
+from coramp.worlds.sumo.engine import run_cooperative
+from coramp.worlds.sumo.files import SumoOptions
 
 ROUNDS = 9
 SUMO_AT_MOST = 1.15

@@ -13,7 +13,7 @@ from coramp.records.run_folder import MARK as RUN_MARK
 from coramp.records.run_folder import SUMO, not_replaceable, read_run, write_run
 from coramp.records.staging import staged_folder
 from coramp.results import PlanResult, RunResult, StudyResult, as_pandas
-from coramp.runs.expected_queue import (
+from coramp.runs.beforehand import (
     demand_above_limit,
     demands_above_limit,
     seeds_without_effect,
@@ -32,7 +32,7 @@ from coramp.studies.shown import keep_shown
 from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
-from coramp.worlds.sumo.engine import SumoOptions
+from coramp.worlds.sumo.files import SumoOptions
 
 if TYPE_CHECKING:
     from coramp.report.figures import FigureSet

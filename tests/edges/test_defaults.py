@@ -135,14 +135,14 @@ def test_populations_that_every_scenario_has_can_be_set(bare):
     assert scenario.drivers["credible"] == load_scenario("paper").drivers["credible"]
 
 
-def test_gaps_of_commanded_vehicles_are_said_to_change_nothing_for_drivers(bare):
+def test_gaps_of_coordinated_vehicles_are_said_to_bind_no_drivers(bare):
     notes = []
     overrides = {"safety.time_gap_s": 1.4, "drivers.fair.sigma": 0.0}
     coramp.run(bare(), "uncontrolled", overrides=overrides, horizon_s=20.0, notice=notes.append)
     assert notes == [
         (
-            "safety.time_gap_s: changes nothing for drivers; what they keep is "
-            "drivers.fair.tau_s and drivers.fair.min_gap_m"
+            "safety.time_gap_s: for coordinated vehicles only; drivers keep "
+            "drivers.fair.tau_s and drivers.fair.min_gap_m instead"
         )
     ]
 

@@ -36,6 +36,7 @@ DELAYED = (
 
 BOOK, TRAJECTORY = "coordination/book.py", "kinematics/trajectory.py"
 SEPARATIONS = "metrics/separations.py"
+SAFETY_FIGURES = "metrics/safety_figures.py"
 START_BY_THE_COMMAND = Edit(
     "checker/checker.py",
     "_examine_start(pieces, earliest_s, pieces[0, 0], station_m, speed_mps)",
@@ -144,7 +145,13 @@ FAULTS = (
     ),
     Fault(
         "the row says half of the largest severity",
-        (Edit("metrics/tables.py", '"max_severity": float(', '"max_severity": 0.5 * float('),),
+        (
+            Edit(
+                "metrics/safety_figures.py",
+                '"max_severity": float(',
+                '"max_severity": 0.5 * float(',
+            ),
+        ),
         BUSY,
     ),
 )

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coramp.metrics.margins import least_margin_m
+from coramp.metrics.safety_figures import safety_figures
 from coramp.metrics.separations import closing_extremes
-from coramp.metrics.tables import safety_figures
 from coramp.vehicles.separation import smallest_margin_m
 from tests.mathematics import SAFETY, random_pairs
 from tests.metrics import NEVER, PAPER, Car, outcome_of

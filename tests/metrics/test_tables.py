@@ -4,12 +4,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from coramp.coordination.coordinator import DecisionRecord, Refusal
-from coramp.metrics.tables import (
-    decisions_table,
-    tables_of,
-    trajectories_table,
-)
+from coramp.coordination.decision_log import DecisionRecord, Refusal
+from coramp.metrics.frames import decisions_table, trajectories_table
+from coramp.metrics.tables import tables_of
 from coramp.records.schemas import RUN_METRICS, SPEEDS, TRAJECTORIES, VEHICLES, VIOLATIONS
 from coramp.strategies.base import Explanation
 from tests.metrics import NEVER, PAPER, Car, outcome_of

@@ -11,7 +11,8 @@ from coramp.strategies.base import Decision, FollowTrajectory
 from coramp.strategies.proposals import find_unsafe_pair, propose_merge
 from coramp.strategies.situation import assess
 from coramp.vehicles.fleet import empty_proposal
-from coramp.worlds.sumo.engine import SumoOptions, run_cooperative
+from coramp.worlds.sumo.engine import run_cooperative
+from coramp.worlds.sumo.files import SumoOptions
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.log import ACKNOWLEDGEMENT, READING, SIGNAL
 from coramp.metrics.attempts import attempts_table
-from coramp.metrics.tables import decisions_table
+from coramp.metrics.frames import decisions_table
 from coramp.strategies.base import period_of, steps_of_period
 from coramp.strategies.situation import RUNGS
 

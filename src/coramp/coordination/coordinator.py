@@ -5,7 +5,6 @@ Driven by the control clock alone. It knows no simulator: a plant carries the ve
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
 from functools import partial
 
 from coramp._kernel import FloatArray, IntArray
@@ -13,9 +12,6 @@ from coramp.checker.checker import Verdict
 from coramp.checker.reasons import (
     ACCEPTED,
     HOLDS_NEWCOMERS,
-    REASONS,
-    TOO_NEAR,
-    TOO_NEAR_AT_MERGE,
 )
 from coramp.coordination.admission import (
     decision_due_s,
@@ -24,6 +20,7 @@ from coramp.coordination.admission import (
 )
 from coramp.coordination.book import ways_of
 from coramp.coordination.commitments import Commitments
+from coramp.coordination.decision_log import DecisionLog
 from coramp.coordination.drivers import DriverRoad, sorted_by_taker
 from coramp.coordination.examination import Examiner, bounds_of
 from coramp.coordination.gate import (
@@ -53,14 +50,12 @@ from coramp.messages.feed import RequestFeed
 from coramp.motion.approach import stop_starts_s
 from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, packed
-from coramp.strategies.attempts import Attempt
 from coramp.strategies.base import (
     Command,
     Decider,
     Decision,
     Detectors,
     DriveWithAcceleration,
-    Explanation,
     FollowTrajectory,
     Memory,
     View,
@@ -71,33 +66,6 @@ from coramp.strategies.base import (
 )
 from coramp.vehicles.fleet import proposed
 from coramp.vehicles.merge_state import has_place_on_mainline
-
-
-@dataclass(frozen=True, slots=True)
-class DecisionRecord:
-    """One explained decision, with what the checker measured of it."""
-
-    time_s: float
-    explanation: Explanation
-    adjusted_rows: tuple[int, ...]
-    min_margin_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """A plan that the checker did not let pass; the vehicles kept their commitments.
-
-    ``other_row`` is the vehicle that it came too near to, by ``missing_m``; -1 and None for none.
-    ``tried`` is what had been tried for a plan, its last attempt the one refused. It is None for
-    entries, and where the plan before of the vehicle was refused for the same reason.
-    """
-
-    time_s: float
-    row: int
-    reason: str
-    other_row: int = -1
-    missing_m: float | None = None
-    tried: Sequence[Attempt] | None = None
 
 
 class Coordinator:
@@ -120,10 +88,9 @@ class Coordinator:
     ) -> None:
         road = rules.road
         self.ledger = Ledger(len(feed))
-        self.decisions: list[DecisionRecord] = []
-        self.refusals: list[Refusal] = []
+        self._log = DecisionLog(rules.safety.execution_allowance_m)
+        self.decisions, self.refusals = self._log.decisions, self._log.refusals
         self.interventions = 0
-        self._last_refused: dict[int, tuple[int, int]] = {}
         self._strategy = strategy
         self._rules = rules
         self._packed = packed(rules)
@@ -172,8 +139,11 @@ class Coordinator:
         """Asks the strategy at the step of a reading of the road's loops, after all else of it."""
         step = round(reading.time_s / self._step_s)
         self.run(step)
-        _, *told = astuple(reading)
-        self._detectors = Detectors(*told)
+        self._detectors = Detectors(
+            mainline_occupancy=reading.mainline_occupancy,
+            queue_occupancy=reading.queue_occupancy,
+            passed_veh=reading.passed_veh,
+        )
         self._decide((), step)
         self._detectors = None
 
@@ -195,7 +165,7 @@ class Coordinator:
             if stop.why == FULL:
                 self._commitments.make_room()
             elif stop.why == REFUSED:
-                self._note_refusal(stop.step, len(self.ledger), stop.code)
+                self._note_refused_entry(stop.step, stop.code)
 
     def _announce_entries(self) -> int:
         """Tells who has entered; returns the first step at which one of them is planned."""
@@ -282,19 +252,17 @@ class Coordinator:
             self._commitments.examiner.bounds,
         )
         if code not in (ACCEPTED, WAITS):
-            self._note_refusal(step, len(self.ledger), code)
+            self._note_refused_entry(step, code)
         self._announce_entries()
         return bool(code == ACCEPTED)
 
-    def _note_refusal(self, step: int, row: int, code: int) -> None:
-        self.refusals.append(Refusal(step * self._step_s, row, REASONS[code]))
+    def _note_refused_entry(self, step: int, code: int) -> None:
+        self._log.note_refused_entry(len(self.ledger), code, step * self._step_s)
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self._commitments.change(row, pieces, merge_time_s, step * self._step_s)
-        if has_place_on_mainline(
-            merge_time_s
-        ):  # it is planned: nothing is due at its decision station
-            self._wakes.planned(row)
+        if has_place_on_mainline(merge_time_s):
+            self._wakes.planned(row)  # nothing is due any more at its decision station
         self._announce(row, step)
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
@@ -326,7 +294,7 @@ class Coordinator:
             return False
         verdict = self._commitments.examiner.change(moves, time_s, from_s)
         if verdict.code != ACCEPTED:
-            self._note_refusal(step, row, verdict.code)
+            self._log.note_refused_entry(row, verdict.code, time_s)
             return False
         for move in moves:
             self._commit(move.row, move.pieces, move.merge_time_s, step)
@@ -374,7 +342,7 @@ class Coordinator:
                 self._commit(command.row, command.pieces, command.merge_time_s, step)
         self._memory = decision.memory
         self._told_of_entries = len(self.ledger)
-        self._record(decision, trajectories, time_s, margin_m)
+        self._log.note_decision(decision, trajectories, time_s, margin_m)
         for wake_s, row in decision.wakes_s:
             wake_step = first_step_from(wake_s, self._step_s)
             self._wakes.ask(wake_step, row)
@@ -429,32 +397,7 @@ class Coordinator:
         self, decision: Decision, subjects: tuple[int, ...], step: int, verdict: Verdict
     ) -> None:
         time_s = step * self._step_s
+        self._log.note_refused_plan(decision, subjects, verdict, time_s)
         retry_step = first_step_from(time_s + self._rules.control.retry_s, self._step_s)
-        tried = {told.row: told.tried for told in decision.explanations}
-        missing_m = self._rules.safety.execution_allowance_m - verdict.least_margin_m
         for row in subjects:
-            cause = (verdict.code, verdict.other_row)
-            again = self._last_refused.get(row) == cause
-            self._last_refused[row] = cause
-            self.refusals.append(
-                Refusal(
-                    time_s,
-                    row,
-                    REASONS[verdict.code],
-                    verdict.other_row,
-                    missing_m if verdict.code in (TOO_NEAR, TOO_NEAR_AT_MERGE) else None,
-                    None if again else tried.get(row, ()),
-                )
-            )
             self._wakes.ask(retry_step, row)
-
-    def _record(
-        self,
-        decision: Decision,
-        trajectories: Sequence[FollowTrajectory],
-        time_s: float,
-        margin_m: float,
-    ) -> None:
-        for explanation in decision.explanations:
-            adjusted = tuple(c.row for c in trajectories if c.row != explanation.row)
-            self.decisions.append(DecisionRecord(time_s, explanation, adjusted, margin_m))

@@ -10,7 +10,8 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.road.streams import STREAMS
-from coramp.scenarios.model import Mainline, Ramp, Scenario, Vehicle
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import Mainline, Ramp, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
 from coramp.vehicles.traits import CAR, Traits
 

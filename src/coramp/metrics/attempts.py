@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import polars as pl
 
 from coramp._kernel import IntArray
-from coramp.coordination.coordinator import DecisionRecord, Refusal
+from coramp.coordination.decision_log import DecisionRecord, Refusal
 from coramp.records.schemas import ATTEMPTS, Row
 from coramp.strategies.attempts import CHOSEN, Attempt, Tried
 

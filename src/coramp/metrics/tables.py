@@ -1,7 +1,7 @@
 """From an outcome to the tables that a run leaves behind and the figures that sum it up."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -10,32 +10,18 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import FloatArray, IntArray
-from coramp.coordination.coordinator import DecisionRecord
 from coramp.messages.log import as_frame
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.fitting import fitted_pieces
+from coramp.metrics.frames import decisions_table, frame_of, trajectories_table
 from coramp.metrics.lane_figures import bound_figures, braking_figures
-from coramp.metrics.lane_uses import lane_uses
 from coramp.metrics.motion import (
     BIN_S,
     binned_motion,
     fuel_of_each_l,
-    hardest_braking_mps2,
-    largest_jerk_mps3,
 )
 from coramp.metrics.queues import queue_figures
-from coramp.metrics.separations import (
-    DRAC,
-    FIGURES,
-    MARGIN,
-    MERGE_FRONT,
-    MERGE_REAR,
-    NOTED,
-    SEVERITY,
-    TTC,
-    lane_extremes,
-)
-from coramp.metrics.separations import VIOLATIONS as COUNT
+from coramp.metrics.safety_figures import safety_figures, violations_table
 from coramp.metrics.types import (
     free_flow_of_each_s,
     fuel_models_of,
@@ -43,16 +29,12 @@ from coramp.metrics.types import (
     traits_of,
     type_figures,
 )
-from coramp.records.outcome import LANES, Outcome
+from coramp.records.outcome import Outcome
 from coramp.records.schemas import (
-    DECISIONS,
     SPEEDS,
-    TRAJECTORIES,
     TYPES,
     VEHICLES,
-    VIOLATIONS,
     Row,
-    Schema,
 )
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
@@ -98,14 +80,14 @@ class RunTables:
         columns = dict(self.vehicle_columns)
         columns["stream"] = _stream_names(columns["stream"])
         traits = trait_columns(traits_of(self.outcome.passages, self.scenario))
-        return _frame(VEHICLES, **columns, **traits)
+        return frame_of(VEHICLES, **columns, **traits)
 
     @cached_property
     def speeds(self) -> pl.DataFrame:
         """One row a stream and bin of 1 s in which there were vehicles."""
         columns = dict(self.speed_columns)
         columns["stream"] = _stream_names(columns["stream"])
-        return _frame(SPEEDS, **columns)
+        return frame_of(SPEEDS, **columns)
 
     @cached_property
     def trajectories(self) -> pl.DataFrame | None:
@@ -226,11 +208,6 @@ def _stream_names(streams: IntArray) -> list[str]:
     return [STREAMS[stream] for stream in streams.tolist()]
 
 
-def _frame(schema: Schema, **columns: Any) -> pl.DataFrame:
-    frame = pl.DataFrame({name: columns[name] for name in schema}, schema=schema)
-    return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
-
-
 def speed_columns(outcome: Outcome) -> Columns:
     """Returns the space-mean speed of each stream in bins of 1 s, where there are vehicles."""
     passages, pieces = outcome.passages, outcome.pieces
@@ -246,69 +223,6 @@ def speed_columns(outcome: Outcome) -> Columns:
         "mean_speed_mps": distance_m[stream, used] / time_s[stream, used],
         "vehicles": vehicles[stream, used],
     }
-
-
-def trajectories_table(
-    names: Sequence[str], first: IntArray, rows: FloatArray, lane: IntArray
-) -> pl.DataFrame:
-    """Returns one row a piece; vehicle i's are ``rows[first[i] : first[i + 1]]``."""
-    counts = np.diff(first)
-    return _frame(
-        TRAJECTORIES,
-        vehicle_id=[name for name, n in zip(names, counts, strict=True) for _ in range(n)],
-        lane=[LANES[code] for code in lane],
-        time_s=rows[:, 0],
-        station_m=rows[:, 1],
-        speed_mps=rows[:, 2],
-        accel_mps2=rows[:, 3],
-    )
-
-
-def violations_table(outcome: Outcome, scenario: Scenario, count: int) -> pl.DataFrame:
-    """Returns the ``count`` violations of a run, by time; at which the margin was least."""
-    lanes = _extremes_of_lanes(outcome, scenario, count)
-    noted = np.concatenate(
-        [lane[FIGURES : FIGURES + NOTED * int(lane[COUNT])].reshape(-1, NOTED) for lane in lanes]
-    )
-    noted = noted[np.argsort(noted[:, 0], kind="stable")]
-    names = outcome.passages.vehicle_id
-    return _frame(
-        VIOLATIONS,
-        time_s=noted[:, 0],
-        front_vehicle_id=[names[int(front)] for front in noted[:, 1]],
-        rear_vehicle_id=[names[int(rear)] for rear in noted[:, 2]],
-        margin_m=noted[:, 3],
-    )
-
-
-NAMED_ROWS = {
-    "vehicle_id": "row",
-    "conflict_vehicle_id": "conflict_row",
-    "front_vehicle_id": "front_row",
-    "rear_vehicle_id": "rear_row",
-}
-
-
-def decisions_table(
-    decisions: Sequence[DecisionRecord], vehicle_ids: Sequence[str], vehicle_of_row: IntArray
-) -> pl.DataFrame:
-    """Returns one row a decision; what a decision has not is null."""
-
-    def name(row: int) -> str | None:
-        return vehicle_ids[vehicle_of_row[row]] if row >= 0 else None
-
-    rows = []
-    for decision in decisions:
-        why = decision.explanation
-        row: Row = {key: getattr(why, key, None) for key in DECISIONS}
-        row.update({key: name(getattr(why, field)) for key, field in NAMED_ROWS.items()})
-        row["time_s"] = decision.time_s
-        row["scenario"] = why.scenario or None
-        row["adjusted_vehicle_ids"] = [name(adjusted) for adjusted in decision.adjusted_rows]
-        row["min_margin_m"] = decision.min_margin_m
-        rows.append(row)
-    frame = pl.DataFrame(rows, schema=DECISIONS, orient="row")
-    return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
 def stream_figures(vehicles: Columns, speeds: Columns, stream: int) -> Row:
@@ -342,64 +256,6 @@ def _stream_metrics(streams: list[Row]) -> Row:
             result[f"{name}_{key}"] = figures[key]
     result["fuel_l"] = sum(s["fuel_l"] for s in streams)
     return result
-
-
-def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
-    """Returns how near vehicles came and how hard they braked; null where no two met."""
-    mainline, ramp = _extremes_of_lanes(outcome, scenario)
-    margin_m, equation = _least_margin(mainline, ramp)
-    return {
-        "collisions": outcome.collisions,
-        "safety_violations": int(mainline[COUNT] + ramp[COUNT]),
-        "min_margin_m": _finite(margin_m),
-        "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
-        "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
-        "max_severity": float(mainline[SEVERITY]),
-        "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
-        "max_jerk_mps3": _largest_jerk_mps3(outcome),
-        "plan_error_m": _largest(outcome.passages.plan_error_m),
-        "min_margin_equation": equation,
-        "min_merge_margin_m": _finite(min(mainline[MERGE_FRONT], mainline[MERGE_REAR])),
-    }
-
-
-def _least_margin(mainline: FloatArray, ramp: FloatArray) -> tuple[float, int | None]:
-    """Returns the least margin (m) over Eq. 1, or over 15 or 16 where one of these is broken.
-
-    With it comes the number of the equation, None where no two vehicles met.
-    """
-    by_equation = {
-        1: min(mainline[MARGIN], ramp[MARGIN]),
-        15: min(mainline[MERGE_FRONT], 0.0),
-        16: min(mainline[MERGE_REAR], 0.0),
-    }
-    broken = {number: margin for number, margin in by_equation.items() if margin < 0.0}
-    candidates = broken or {1: by_equation[1]}
-    equation = min(candidates, key=lambda number: float(candidates[number]))
-    return float(candidates[equation]), equation if math.isfinite(candidates[equation]) else None
-
-
-def _largest_jerk_mps3(outcome: Outcome) -> float:
-    pieces = outcome.pieces
-    return float(largest_jerk_mps3(pieces.first, pieces.rows, outcome.until_s))
-
-
-def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:
-    """What ``lane_extremes`` finds on the mainline and on the ramp."""
-    rules = scenario.rules()
-    return [
-        lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room)
-        for lane in lane_uses(outcome, traits_of(outcome.passages, scenario))
-    ]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _largest(values: FloatArray) -> float | None:
-    known = values[~np.isnan(values)]
-    return float(known.max()) if len(known) else None
 
 
 def _decision_figures(outcome: Outcome) -> Row:

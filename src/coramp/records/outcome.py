@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.coordination.coordinator import DecisionRecord, Refusal
+from coramp.coordination.decision_log import DecisionRecord, Refusal
 from coramp.messages.log import Told
 from coramp.records.lanes import LaneHistory
 from coramp.vehicles.traits import Traits

@@ -13,7 +13,7 @@ from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.messages.feed import RequestFeed
 from coramp.metrics.attempts import attempts_table
-from coramp.metrics.tables import decisions_table
+from coramp.metrics.frames import decisions_table
 from coramp.records.outcome import LANES
 from coramp.records.schemas import TRAJECTORIES
 from coramp.scenarios.model import Scenario

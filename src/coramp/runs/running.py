@@ -28,10 +28,10 @@ from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import (
     LARGEST_PLAN_ERROR_M,
-    SumoOptions,
     run_cooperative,
     run_uncontrolled,
 )
+from coramp.worlds.sumo.files import SumoOptions
 
 ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"

@@ -72,6 +72,8 @@ def as_toml(name: str) -> str:
         f"# {name} as coramp takes it. What the file leaves out says why it is as it is.",
         f"name = {_text(scenario.name)}",
     ]
+    if scenario.description:
+        lines.append(f"description = {_text(scenario.description)}")
     table = ""
     for key, value, why in keys:
         here, _, plain = key.partition(".")

@@ -5,7 +5,7 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.road.streams import STREAMS
-from coramp.scenarios.model import Simulation
+from coramp.scenarios.sections import Simulation
 
 FLOWS = ("flow_veh_h", "flow_to_veh_h")
 LIST = "arrivals"

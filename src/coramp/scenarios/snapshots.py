@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 from coramp.equations.safe_distance import safe_distance_m
 from coramp.errors import CorampError
 from coramp.scenarios.loading import load_scenario
-from coramp.scenarios.model import Model, Scenario, Speed
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import Model, Speed
 from coramp.scenarios.toml_files import beside, read, validated
 
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import FloatArray, kernel
-from coramp.equations.gaps import least_acceleration_mps2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
@@ -15,12 +14,10 @@ from coramp.kinematics.trajectory import (
     TIME,
     begin,
     clip_end,
-    clip_start,
     station_and_speed,
     time_at_station,
 )
 from coramp.motion.approach import change_speed
-from coramp.motion.slow_phase import least_effort_way, slow_phase
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.delays import delay_followers
 from coramp.strategies.ladder import plan_of
@@ -39,6 +36,13 @@ from coramp.strategies.situation import (
     ramp_neighbours,
 )
 from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
+from coramp.strategies.slot_on_ramp import (
+    SAME_MPS,
+    leave_stop_at,
+    leave_stop_for_slot,
+    slow_on_ramp,
+    smooth_on_ramp,
+)
 from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
 from coramp.strategies.slot_pushing import fall_back_behind
 from coramp.vehicles.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
@@ -61,11 +65,9 @@ from coramp.vehicles.trace import (
 
 ROOM = 128
 """Vehicles that a plan may change: the subject and those behind it."""
-SAME_MPS = 1e-6
 NOSES = ((0.0, 0.0), (0.0, 0.1), (0.0, 0.25), (0.0, 0.5), (0.0, 1.0), (1.0, 0.0), (1.0, 0.5))
 """How the nose is passed: how far from the ramp's speed to its limit and, behind it, how far from
 free movement's acceleration to the largest."""
-LONGEST_WAIT_S = 1e4
 MOST_TRIES_PUSHING = 3
 """Ways of the subject that are tried where others fall back: each try has them all planned."""
 PATIENCE_S = 5.0
@@ -364,114 +366,3 @@ def leader_regains_s(fleet: Fleet, situation: Situation, rules: Rules) -> float:
         if ahead[k, SPEED] < rules.road.ramp_speed_mps - SAME_MPS and ahead[k, STATION] < 0.0:
             regained_s = ahead[k + 1, TIME]
     return float(regained_s)
-
-
-@kernel
-def slow_on_ramp(
-    fleet: Fleet,
-    situation: Situation,
-    nose_s: float,
-    nose_mps: float,
-    end_s: float,
-    out: FloatArray,
-    rules: Rules,
-) -> int:
-    """Writes the approach that passes the nose at ``nose_s`` with ``nose_mps``.
-
-    It goes to a slower speed at once and is back by ``end_s``. Returns its length, 0 where that
-    asks for less than ``slowest_ramp_speed_mps``.
-    """
-    motion = rules.motion
-    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
-    n = slow_phase(
-        out,
-        situation.from_s,
-        station_m,
-        speed_mps,
-        end_s,
-        -nose_mps * nose_s,
-        nose_mps,
-        motion.slow_down_mps2,
-        motion.speed_up_mps2,
-    )
-    if n == 0 or out[:n, SPEED].min() < min(speed_mps, motion.slowest_ramp_speed_mps):
-        return 0
-    return clip_end(out, n, max(out[n - 1, TIME], nose_s))
-
-
-@kernel
-def smooth_on_ramp(
-    fleet: Fleet,
-    situation: Situation,
-    nose_s: float,
-    nose_mps: float,
-    jerk_mps3: float,
-    out: FloatArray,
-    rules: Rules,
-) -> int:
-    """Writes the approach of least effort that passes the nose at ``nose_s`` with ``nose_mps``."""
-    station_m, speed_mps = station_and_speed(committed(fleet, situation.subject), situation.from_s)
-    n = least_effort_way(
-        out,
-        situation.from_s,
-        station_m,
-        speed_mps,
-        nose_s,
-        -nose_mps * nose_s,
-        nose_mps,
-        jerk_mps3,
-        rules.motion,
-    )
-    if n == 0 or out[:n, SPEED].min() < rules.motion.slowest_ramp_speed_mps:
-        return 0
-    if out[:n, SPEED].max() > rules.road.ramp_limit_mps + SAME_MPS:
-        return 0
-    return n
-
-
-@kernel
-def leave_stop_for_slot(
-    fleet: Fleet, situation: Situation, slot_m: float, out: FloatArray, rules: Rules
-) -> tuple[int, float]:
-    """Writes the approach that keeps to its commitment until it must leave it for the slot.
-
-    The later it speeds up to the ramp's speed, the later it comes; the time is found by halving.
-    Returns the approach's length, 0 for none, and the acceleration (m/s2) behind the nose.
-    """
-    before, from_s = committed(fleet, situation.subject), situation.from_s
-    if leave_stop_at(before, from_s, from_s, out, rules)[2] < slot_m - KEEP_M:
-        return 0, math.nan
-    early_s, late_s = from_s, from_s + 1.0
-    while leave_stop_at(before, from_s, late_s, out, rules)[2] > slot_m:
-        early_s, late_s = late_s, late_s + 2.0 * (late_s - from_s)
-        if late_s > from_s + LONGEST_WAIT_S:
-            return 0, math.nan
-    while late_s - early_s > 1e-9 * late_s:
-        middle_s = 0.5 * (early_s + late_s)
-        if leave_stop_at(before, from_s, middle_s, out, rules)[2] > slot_m:
-            early_s = middle_s
-        else:
-            late_s = middle_s
-    n, accel_mps2, _ = leave_stop_at(before, from_s, late_s, out, rules)
-    return n, accel_mps2
-
-
-@kernel
-def leave_stop_at(
-    before: FloatArray, from_s: float, leave_s: float, out: FloatArray, rules: Rules
-) -> tuple[int, float, float]:
-    """Writes the approach that leaves a commitment at ``leave_s`` for the ramp's speed.
-
-    Returns its length, the acceleration (m/s2) behind the nose, free movement's within Eq. 22, and
-    the intercept (m) that it ends on.
-    """
-    road, motion = rules.road, rules.motion
-    v0 = road.mainline_speed_mps
-    n = clip_start(before, from_s, out)
-    n = clip_end(out, n, leave_s)
-    n = change_speed(out, n, road.ramp_speed_mps, motion)
-    n = clip_end(out, n, time_at_station(out[:n], 0.0))
-    nose_s, nose_mps = out[n - 1, TIME], out[n - 1, SPEED]
-    least = least_acceleration_mps2(v0, nose_mps, road.last_merge_station_m)
-    accel_mps2 = min(max(motion.free_acceleration_mps2, least), motion.ramp_acceleration_mps2)
-    return n, accel_mps2, -v0 * nose_s - lag_m(v0, nose_mps, accel_mps2)

@@ -10,7 +10,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from coramp.errors import CorampError
 from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
-from coramp.scenarios.model import Flow, Model
+from coramp.scenarios.sections import Flow, Model
 from coramp.scenarios.toml_files import beside, read, validated
 from coramp.strategies.registry import strategy_named
 

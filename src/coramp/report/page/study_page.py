@@ -24,7 +24,7 @@ from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
 from coramp.report.varied_figure import readable, varied_figure
-from coramp.runs.expected_queue import of_automation
+from coramp.runs.beforehand import of_automation
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
 from coramp.studies.overrides import overrides_of
@@ -177,8 +177,8 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     keys = _without_effect(runs)
     if keys:
         yield (
-            f"{', '.join(keys)} changes nothing for drivers: their runs are the same with each of "
-            "its values. What they keep is tau_s and min_gap_m of their population."
+            f"{', '.join(keys)}: for coordinated vehicles only. Drivers drive the same with every "
+            "value; they keep tau_s and min_gap_m of their population."
         )
     failed = runs.filter(status="failed").height
     if failed:
@@ -186,7 +186,7 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
 
 
 def _without_effect(runs: pl.DataFrame) -> list[str]:
-    """The settings of runs with drivers that bind commanded vehicles alone."""
+    """The settings of runs with drivers that bind coordinated vehicles only."""
     of_drivers = runs.filter(pl.col("drivers").is_not_null()).iter_rows(named=True)
     return of_automation([overrides_of(row) for row in of_drivers])
 

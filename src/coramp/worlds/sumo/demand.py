@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 
 from coramp.coordination.plant import Arrival
-from coramp.scenarios.model import Drivers, Scenario, Vehicle
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import Drivers, Vehicle
 from coramp.vehicles.traits import CAR
 from coramp.worlds.sumo.traits import Traits
 

@@ -1,17 +1,14 @@
 """Runs a scenario in SUMO: cooperative vehicles in closed loop, or SUMO's own drivers."""
 
 import math
-import shutil
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 
-from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
@@ -25,8 +22,8 @@ from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.lanes import first_on_mainline_s, seen_history
 from coramp.records.outcome import Outcome, Pieces, until_s
-from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
-from coramp.scenarios.model import Drivers, Scenario
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import Drivers
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.vehicles.merge_state import BY_MAINLINE_S
 from coramp.worlds.outcomes import (
@@ -38,12 +35,10 @@ from coramp.worlds.outcomes import (
 )
 from coramp.worlds.sumo.cooperative import CooperativePlant
 from coramp.worlds.sumo.demand import cooperative_routes, driver_routes
+from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
 from coramp.worlds.sumo.metering import Meter, loops
 from coramp.worlds.sumo.network import (
-    RAMP_LANES,
-    RoadPlan,
     driver_road_plan,
-    network_file,
     road_plan,
 )
 from coramp.worlds.sumo.session import Session
@@ -51,35 +46,10 @@ from coramp.worlds.sumo.telling import DriversInSumo, positions_in_sumo, with_an
 from coramp.worlds.sumo.traits import traits_of
 from coramp.worlds.telling import reports_of_samples, together
 
-PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
 LARGEST_PLAN_ERROR_M = 0.05
 """A run in which SUMO is further off a plan has not kept its promise."""
-COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Positions of SUMO's vehicles at its steps, by vehicle and time.
-
-    ``on_mainline`` is False on the ramp and the acceleration lane.
-    """
-
-    vehicle: IntArray
-    on_mainline: BoolArray
-    time_s: FloatArray
-    station_m: FloatArray
-    speed_mps: FloatArray
-
-
-@dataclass(frozen=True)
-class SumoOptions:
-    """How a run is watched: files kept in a folder, a window, messages kept in the outcome."""
-
-    keep_in: Path | None = None
-    gui: bool = False
-    keep_messages: bool = False
 
 
 def run_cooperative(
@@ -106,7 +76,7 @@ def _run_cooperative(
     plan = road_plan(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         keep = options.keep_messages
-        files = _Files(
+        files = RunFiles(
             Path(name), scenario, plan, seed, options, ballistic=True, sampled=sampled or keep
         )
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
@@ -193,7 +163,7 @@ def run_uncontrolled(
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
-        files = _Files(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
+        files = RunFiles(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         traits = traits_of(drivers, arrivals, seed)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered))
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
@@ -297,116 +267,3 @@ def _passing_times(
     exit_s[seen] = samples.time_s[last] + run_on_s
     done = np.array([arrival.vehicle_id in finished for arrival in arrivals], np.bool_)
     return entry_s, np.where(done, exit_s, np.nan)
-
-
-class _Files:
-    """The files of one run in a folder of its own, and what is read from them."""
-
-    def __init__(
-        self,
-        folder: Path,
-        scenario: Scenario,
-        plan: RoadPlan,
-        seed: int,
-        options: SumoOptions,
-        ballistic: bool,
-        sampled: bool = False,
-    ) -> None:
-        self._folder = folder
-        self._plan = plan
-        self._step_s = scenario.control.step_s
-        self._seed = seed
-        self._keep_in = options.keep_in
-        self._ballistic = ballistic
-        self._sampled = sampled
-        self._cap_s = scenario.simulation.horizon_s + scenario.simulation.drain_s
-
-    def write_routes(self, text: str) -> None:
-        (self._folder / "routes.rou.xml").write_text(text)
-
-    def write_loops(self, text: str) -> None:
-        (self._folder / SUMO_LOOPS).write_text(text)
-
-    def _loops(self, name: Path) -> list[str]:
-        return ["--additional-files", str(name)] if (self._folder / SUMO_LOOPS).exists() else []
-
-    def options(self) -> list[str]:
-        """Returns SUMO's options, output files included."""
-        folder = self._folder
-        result = [
-            *("--net-file", str(network_file(self._plan))),
-            *("--route-files", str(folder / "routes.rou.xml")),
-            *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
-            *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
-            *self._loops(folder / SUMO_LOOPS),
-        ]
-        if self._ballistic:
-            result.append("--step-method.ballistic")
-        if self._sampled or self._keep_in is not None:
-            result += ["--fcd-output", str(folder / "fcd.parquet"), "--precision", "4"]
-            result += ["--tripinfo-output", str(folder / "tripinfo.xml")]
-        if self._keep_in is None:
-            result += ["--fcd-output.attributes", "lane,pos,speed"] if self._sampled else []
-        else:
-            result += ["--tripinfo-output.write-unfinished", "--tripinfo-output.write-undeparted"]
-        return result
-
-    def keep(self) -> None:
-        """Copies the files to where they are to be kept, with a command that uses them."""
-        if self._keep_in is None:
-            return
-        self._keep_in.mkdir(parents=True, exist_ok=True)
-        shutil.copy(network_file(self._plan), self._keep_in / SUMO_NETWORK)
-        for name in SUMO_COPIES:
-            shutil.copy(self._folder / name, self._keep_in / name)
-        if self._loops(Path(SUMO_LOOPS)):
-            shutil.copy(self._folder / SUMO_LOOPS, self._keep_in / SUMO_LOOPS)
-        command = [
-            *("sumo", "--net-file", SUMO_NETWORK, "--route-files", "routes.rou.xml"),
-            *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
-            *self._loops(Path(SUMO_LOOPS)),
-            *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
-            *(("--step-method.ballistic",) if self._ballistic else ()),
-        ]
-        (self._keep_in / SUMO_COMMAND).write_text(" ".join(command) + "\n")
-
-    def collisions(self) -> int:
-        """Returns how many pairs of vehicles SUMO saw collide."""
-        root = ET.parse(self._folder / "collisions.xml").getroot()
-        pairs = {(c.get("collider"), c.get("victim")) for c in root.iter("collision")}
-        return len(pairs)
-
-    def finished(self) -> set[str]:
-        """Returns the vehicles that left the network."""
-        root = ET.parse(self._folder / "tripinfo.xml").getroot()
-        return {
-            trip.get("id", "")
-            for trip in root.iter("tripinfo")
-            if float(trip.get("arrival", "-1")) >= 0.0
-        }
-
-    def samples(self, arrivals: Sequence[Arrival]) -> Samples:
-        """Returns all positions, by vehicle and time."""
-        starts_m = self._plan.lane_starts_m()
-        number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
-        on_mainline = {lane: lane not in RAMP_LANES for lane in starts_m}
-        lane = pl.col("vehicle_lane")
-        written = pl.read_parquet(self._folder / "fcd.parquet")
-        if "vehicle_id" not in written.columns:  # nobody ever drove
-            nothing = np.empty(0)
-            return Samples(nothing.astype(np.int64), nothing.astype(np.bool_), *[nothing] * 3)
-        frame = (
-            written.lazy()
-            .drop_nulls("vehicle_id")
-            .select(
-                vehicle=pl.col("vehicle_id").replace_strict(number, return_dtype=pl.Int64),
-                on_mainline=lane.replace_strict(on_mainline, return_dtype=pl.Boolean),
-                time_s="timestep_time",
-                station_m=lane.replace_strict(starts_m, return_dtype=pl.Float64)
-                + pl.col("vehicle_pos"),
-                speed_mps="vehicle_speed",
-            )
-            .sort("vehicle", "time_s")
-            .collect()
-        )
-        return Samples(*(frame[name].to_numpy() for name in frame.columns))

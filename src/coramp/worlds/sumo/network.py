@@ -20,7 +20,8 @@ from pathlib import Path
 import sumo
 
 from coramp.errors import CorampError
-from coramp.scenarios.model import Drivers, Scenario
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import Drivers
 
 LANE_WIDTH_M = 3.2
 RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})

@@ -10,7 +10,7 @@ from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import generator
 from coramp.road.streams import STREAMS
-from coramp.scenarios.model import Drivers, SpeedFactor
+from coramp.scenarios.sections import Drivers, SpeedFactor
 
 
 @dataclass(frozen=True)

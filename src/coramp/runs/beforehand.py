@@ -1,14 +1,14 @@
-"""What can be said of a run before it: whether more arrive than the lane carries."""
+"""What can be said of runs beforehand: demand above the limit, settings without effect."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
 from coramp.runs.running import RunSpec
-from coramp.scenarios.model import Safety
+from coramp.scenarios.sections import Safety
 
 OF_AUTOMATION = ("safety.", "motion.")
-"""Sections that bind vehicles that are commanded, and no drivers."""
+"""Sections that bind coordinated vehicles, but not drivers."""
 
 
 def demand_above_limit(spec: RunSpec) -> str | None:
@@ -41,22 +41,22 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
 
 
 def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
-    """Returns in a line which settings of runs with drivers change nothing for them, or None."""
+    """Returns in a line which settings of runs with drivers bind no driver, or None."""
     of_drivers = [spec for spec in specs if spec.drivers is not None]
     found = of_automation([dict(spec.overrides) for spec in of_drivers])
     if not found:
         return None
     keys, population = ", ".join(found), of_drivers[0].drivers
     return (
-        f"{keys}: changes nothing for drivers; what they keep is drivers.{population}.tau_s and "
-        f"drivers.{population}.min_gap_m"
+        f"{keys}: for coordinated vehicles only; drivers keep drivers.{population}.tau_s and "
+        f"drivers.{population}.min_gap_m instead"
     )
 
 
 def of_automation(settings: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Returns which settings of runs with drivers bind vehicles that are commanded, and no drivers.
+    """Returns which of the settings of runs with drivers bind coordinated vehicles only.
 
-    Of a single run that is all such; of several those alone in which they differ.
+    For several runs, only settings in which the runs differ are returned.
     """
     keys = {key: None for found in settings for key in found if key.startswith(OF_AUTOMATION)}
     values = {key: {str(found.get(key)) for found in settings} for key in keys}
