@@ -6,8 +6,8 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
+from contextlib import AbstractContextManager, contextmanager
+from types import FrameType, TracebackType
 
 from coramp._kernel import compiling
 
@@ -23,60 +23,72 @@ class TooLong(BaseException):
     """The time is over; no ``except Exception`` catches it."""
 
 
-@contextmanager
-def time_limit(longest_s: float) -> Iterator[None]:
+def time_limit(longest_s: float) -> AbstractContextManager[None]:
     """Raises TooLong inside the block after that time, and goes on until the block is left.
 
     Compiling a kernel does not count. What runs in native code is interrupted when it comes back to
     Python; outside the main thread that holds for waiting, too. In the main thread, recursion is
     limited inside the block, and ends there when the time is over, whatever it catches.
     """
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    with (_by_alarm if in_main_thread else _by_watch)(longest_s):
-        yield
+    if threading.current_thread() is threading.main_thread():
+        return _Alarm(longest_s)
+    return _watched(longest_s)
 
 
-@contextmanager
-def _by_alarm(longest_s: float) -> Iterator[None]:
-    limit = sys.getrecursionlimit()
-    _lower_recursion_limit(1)
-    lowest = sys.getrecursionlimit() + LEAVING_FRAMES
-    inside = max(lowest, min(limit, MOST_FRAMES))
-    sys.setrecursionlimit(inside)
-    over_s = time.monotonic() + longest_s
+class _Alarm:
+    """Raises TooLong by a timer signal.
 
-    def give_up(_: int, frame: FrameType | None) -> None:
-        nonlocal over_s
+    A class, and no generator: once recursion is limited, leaving the block must take few frames.
+    """
+
+    def __init__(self, longest_s: float) -> None:
+        self._longest_s = longest_s
+
+    def __enter__(self) -> None:
+        self._limit = sys.getrecursionlimit()
+        _lower_recursion_limit(1)
+        self._lowest = sys.getrecursionlimit() + LEAVING_FRAMES
+        self._inside = max(self._lowest, min(self._limit, MOST_FRAMES))
+        sys.setrecursionlimit(self._inside)
+        self._is_over, self._over_s = False, time.monotonic() + self._longest_s
+        self._before = signal.signal(signal.SIGALRM, self._give_up)
+        signal.setitimer(signal.ITIMER_REAL, min(LOOK_S, self._longest_s), LOOK_S)
+
+    def _give_up(self, _: int, frame: FrameType | None) -> None:
         if frame is None or frame.f_code.co_filename in _LEAVING:
             return
-        if compiling():
-            over_s = time.monotonic() + longest_s
-        elif time.monotonic() >= over_s or sys.getrecursionlimit() > inside:
-            over_s = 0.0
+        if not self._is_over and compiling():
+            self._over_s = time.monotonic() + self._longest_s
+        elif (
+            self._is_over
+            or time.monotonic() >= self._over_s
+            or sys.getrecursionlimit() > self._inside
+        ):
+            self._is_over = True
             signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
             handled = sys.exc_info()[1]
             if handled is not None:  # Python walks its whole chain for every error raised
                 handled.__context__ = None
-            _lower_recursion_limit(lowest)
+            _lower_recursion_limit(self._lowest)
             raise TooLong
 
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, min(LOOK_S, longest_s), LOOK_S)
-    try:
-        yield
-    except RecursionError:
-        if over_s == 0.0:
-            raise TooLong from None
-        raise
-    finally:
-        sys.setrecursionlimit(limit)
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        sys.setrecursionlimit(self._limit)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, _nothing if before is signal.SIG_DFL else before)
+        before = _nothing if self._before is signal.SIG_DFL else self._before
+        signal.signal(signal.SIGALRM, before)
+        if self._is_over and isinstance(error, RecursionError):
+            raise TooLong from None
 
 
 LEAVING_FRAMES = 6
-"""So many frames leaving the block may take, on top of those that entering it took: those of the
-context managers, and those of another alarm that comes meanwhile."""
+"""So many frames leaving the block may take, on top of those that entering it took: its own, and
+those of an alarm that comes meanwhile."""
 
 
 def _lower_recursion_limit(lowest: int) -> None:
@@ -100,12 +112,12 @@ def _nothing(*_: object) -> None:
     """Takes a last alarm that was under way when the timer stopped; by default it would kill."""
 
 
-_LEAVING = frozenset({__file__, contextmanager.__code__.co_filename, signal.__file__})
+_LEAVING = frozenset({__file__, signal.__file__})
 """Files whose code leaves the block: there it is too late to interrupt."""
 
 
 @contextmanager
-def _by_watch(longest_s: float) -> Iterator[None]:
+def _watched(longest_s: float) -> Iterator[None]:
     thread = ctypes.c_ulong(threading.get_ident())
     left, lock = threading.Event(), threading.Lock()
 
