@@ -197,3 +197,10 @@ def test_what_was_chosen_is_shown_as_toml_of_the_same_scenario(bare, tmp_path):
     assert other.mainline == one.mainline
     assert invoke("scenarios", "paper").out == built_in("scenarios", "paper")
     assert_refused(invoke("scenarios", Path(tmp_path) / "nowhere.toml"))
+
+
+def test_the_description_is_shown_too(bare):
+    told = invoke(
+        "scenarios", bare({"\n[mainline]": '\ndescription = "A \\"short\\" lane"\n[mainline]'})
+    )
+    assert 'description = "A \\"short\\" lane"\n' in told.out
