@@ -2,12 +2,13 @@
 
 import math
 import zlib
+from collections.abc import Sequence
 from itertools import count
 from operator import itemgetter
 
 import numpy as np
 
-from coramp._kernel import FloatArray
+from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
@@ -191,3 +192,27 @@ def kinds_of(
         top_mps = high_mps if math.isinf(high_mps) else low_mps + share * (high_mps - low_mps)
         kinds.append((types[place], top_mps))
     return kinds
+
+
+def automated_of(scenario: Scenario, arrivals: Sequence[Arrival], seed: int) -> BoolArray:
+    """Returns which arrivals are automated vehicles, one entry each.
+
+    Each stream has random numbers of its own, one a vehicle in the order of arrival, which do not
+    depend on the share: who is automated at one share is so at every higher one.
+    """
+    share = [scenario.automated_share_of(a.vehicle_type, a.on_ramp) for a in arrivals]
+    return _draws(arrivals, seed, "traffic/automated") < np.array(share)
+
+
+def connected_of(scenario: Scenario, arrivals: Sequence[Arrival], seed: int) -> BoolArray:
+    """Returns which arrivals tell where they are if they are drivers, drawn as in automated_of."""
+    return _draws(arrivals, seed, "traffic/connected") < scenario.traffic.connected_share
+
+
+def _draws(arrivals: Sequence[Arrival], seed: int, purpose: str) -> FloatArray:
+    draws = np.empty(len(arrivals))
+    on_ramp = np.array([arrival.on_ramp for arrival in arrivals], np.bool_)
+    for ramp, stream in enumerate(STREAMS):
+        own = on_ramp == bool(ramp)
+        draws[own] = generator(seed, f"{purpose}/{stream}").random(int(own.sum()))
+    return draws

@@ -28,6 +28,7 @@ from coramp.scenarios.sections import (
     Ramp,
     Safety,
     Simulation,
+    TrafficMix,
     Vehicle,
     Vehicles,
 )
@@ -67,6 +68,7 @@ class Scenario(Model):
     simulation: Simulation = Simulation()
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = Field(default_factory=dict)
+    traffic: TrafficMix = TrafficMix()
 
     @field_validator("strategy", mode="before")
     @classmethod
@@ -101,6 +103,17 @@ class Scenario(Model):
     def usual_length_m(self) -> float:
         """The length (m) of the type that most vehicles of the mainline have."""
         return max(self.vehicle_types, key=lambda kind: kind.share_of(False)).length_m
+
+    def automated_share_of(self, type_name: str, on_ramp: bool) -> float:
+        """Returns which share of a type's vehicles on a stream is automated."""
+        own = self.type_named(type_name).automated_share
+        return self.traffic.share_of(on_ramp) if own is None else own
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether some vehicle of this scenario may have a driver."""
+        kinds = [(kind.name, ramp) for kind in self.vehicle_types for ramp in (False, True)]
+        return any(self.automated_share_of(*kind) < 1.0 for kind in kinds)
 
     @property
     def longest_m(self) -> float:

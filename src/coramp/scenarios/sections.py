@@ -169,6 +169,33 @@ class Drivers(Model):
         return self.tau_s if isinstance(self.tau_s, tuple) else (self.tau_s,)
 
 
+SharePart = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class TrafficMix(Model):
+    """Which vehicles are automated and which have drivers, in SUMO.
+
+    ``automated_share`` holds for both streams; ``mainline_automated_share`` and
+    ``ramp_automated_share`` for one; a type of vehicles may have its own. ``drivers`` names the
+    population of the others, of whom ``connected_share`` tell the coordinator where they are.
+    ``automation`` is how automated vehicles drive that nobody coordinates, by SUMO's Krauss
+    without imperfection: whether they yield to who wants to change lanes.
+    """
+
+    automated_share: SharePart | None = None
+    mainline_automated_share: SharePart | None = None
+    ramp_automated_share: SharePart | None = None
+    drivers: Annotated[str, Field(min_length=1)] = "fair"
+    connected_share: SharePart = 1.0
+    automation: Literal["yielding", "not-yielding"] = "yielding"
+
+    def share_of(self, on_ramp: bool) -> float:
+        """Returns the automated share of a stream, 1 where nothing is said."""
+        own = self.ramp_automated_share if on_ramp else self.mainline_automated_share
+        given = self.automated_share if own is None else own
+        return 1.0 if given is None else given
+
+
 class ExplicitArrival(Model):
     """One vehicle of a given list of arrivals; times lie on the step grid.
 

@@ -39,7 +39,7 @@ class VehicleType(BaseModel):
     """One type of vehicles. What is left out is a car's, or what binds all vehicles.
 
     ``share`` is the type's share of both streams; ``mainline_share`` and ``ramp_share`` are its
-    share of one. A vehicle with ``power_wpkg`` speeds up by at most that over its speed.
+    share of one. ``automated_share`` of them are automated, as in ``[traffic]`` if left out. A vehicle with ``power_wpkg`` speeds up by at most that over its speed.
     ``top_speed_mps`` is the speed at which it cruises where v0 is higher, one for all or two
     between which each vehicle draws its own. ``fuel`` names a model of ``kinematics.fuel``,
     ``sumo_class`` SUMO's vClass for drivers.
@@ -60,6 +60,7 @@ class VehicleType(BaseModel):
     time_gap_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     positioning_error_m: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
     clock_error_s: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    automated_share: Share | None = None
     fuel: Literal["passenger-car", "heavy-duty"] = "passenger-car"
     sumo_class: Literal["passenger", "delivery", "truck", "trailer", "bus", "coach"] = "passenger"
 

@@ -14,6 +14,7 @@ from coramp.strategies.fifo_optimal_control import FifoOptimalControl
 from coramp.strategies.game import Game
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.milp_sequence import MilpSequence
+from coramp.strategies.mixed_slots import MixedSlots
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.ramp_priority import RampPriority
 from coramp.strategies.slots import Slots
@@ -55,6 +56,7 @@ _OURS: tuple[type[Strategy], ...] = (
     VirtualPlatoon,
     Ocbf,
     Slots,
+    MixedSlots,
     Alinea,
     Uncontrolled,
 )

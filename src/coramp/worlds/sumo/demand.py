@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+from coramp._kernel import BoolArray
 from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import Drivers, Vehicle
@@ -13,6 +15,21 @@ FASTEST_COMMAND_MPS = 100.0
 """The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
 PROFILE_MPS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
 """Speeds at which a driver's acceleration is given to SUMO, which interpolates."""
+
+
+@dataclass(frozen=True)
+class Automated:
+    """Who is automated, one entry an arrival, and how SUMO's drivers know such vehicles.
+
+    ``manners`` are further attributes of their types, on lane changes.
+    """
+
+    vehicles: BoolArray
+    tau_s: float
+    min_gap_m: float
+    manners: str
+
+
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
   <route id="ramp" edges="{ramp} merge downstream"/>"""
 
@@ -64,8 +81,11 @@ def driver_routes(
     arrivals: Sequence[Arrival],
     traits: Sequence[Traits],
     metered: bool = False,
+    automated: Automated | None = None,
 ) -> str:
     """Returns the route file of an uncontrolled run with a population of drivers.
+
+    Who is ``automated`` has a type of its own.
 
     Drivers who wish their entry speed get a type of their own each, by ``maxSpeed``. Drivers who
     wish free flow take v_R0 from the ramp's limit, and v0 from ``maxSpeed`` or, with a speed
@@ -73,7 +93,13 @@ def driver_routes(
     SUMO lets nobody enter faster than he wishes, so their entry speed is capped at that.
     """
     types, vehicles = {}, []
-    for arrival, own in zip(arrivals, traits, strict=True):
+    for k, (arrival, own) in enumerate(zip(arrivals, traits, strict=True)):
+        if automated is not None and automated.vehicles[k]:
+            name, line = _automated_type(scenario, arrival, automated)
+            entry_mps = min(arrival.speed_mps, automated_cruise_mps(scenario, arrival))
+            types[name] = line
+            vehicles.append(_vehicle(arrival, name, entry_mps, scenario.control.step_s))
+            continue
         if drivers.wish == "entry-speed":
             wish_mps = entry_mps = arrival.speed_mps
             name = f"driver-{arrival.vehicle_id}"
@@ -95,6 +121,29 @@ def driver_routes(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
         )
     return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
+
+
+def automated_cruise_mps(scenario: Scenario, arrival: Arrival) -> float:
+    """Returns the speed at which an automated vehicle cruises: v0, or its own top speed."""
+    return min(scenario.mainline.speed_mps, _top_mps(arrival))
+
+
+def _automated_type(
+    scenario: Scenario, arrival: Arrival, automated: Automated
+) -> tuple[str, str]:
+    """Returns an automated vehicle's type in SUMO, by name and line: Krauss without imperfection.
+
+    Drivers judge gaps to it by its ``tau`` and ``minGap``, which are what it keeps.
+    """
+    top_mps = automated_cruise_mps(scenario, arrival)
+    name = f"automated-{arrival.vehicle_type}-{arrival.length_m!r}-{top_mps!r}"
+    line = (
+        f'  <vType id="{name}" length="{arrival.length_m!r}" maxSpeed="{top_mps!r}" '
+        f'speedFactor="1" speedDev="0" sigma="0" tau="{automated.tau_s!r}" '
+        f'minGap="{automated.min_gap_m!r}" {automated.manners}'
+        f"{_class(scenario, arrival)}/>"
+    )
+    return name, line
 
 
 def _top_mps(arrival: Arrival) -> float:

@@ -23,6 +23,8 @@ OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
+DRIVERS_CHANGES = 1621
+"""SUMO's own lane change mode: drivers yield to a vehicle that would like to change."""
 GREEN, YELLOW, RED = "G", "y", "r"
 ACTION_S = 1.0
 """How often SUMO lets a vehicle that was taken over look around.
@@ -99,6 +101,41 @@ class Session:
         """Switches off the vehicle's own driver."""
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
         libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
+
+    def take_over_among_drivers(self, vehicle_id: str) -> None:
+        """Commands a vehicle's speed; SUMO still has it ask drivers to make room for it."""
+        libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
+
+    def drive_evenly(
+        self, vehicle_id: str, before_mps: float, after_mps: float, steps: int
+    ) -> None:
+        """Commands an even change of speed over steps, from the speed that the last step had.
+
+        Under Euler steps a vehicle goes x = v t + a t^2 / 2 exactly if ``before_mps`` is
+        v - a h / 2 and ``after_mps`` v + a (n - 1/2) h for n steps of h.
+        """
+        if not math.isfinite(before_mps):
+            raise CorampError(f"SUMO: {vehicle_id}: a speed of {before_mps} m/s cannot be")
+        _check_speed(vehicle_id, after_mps)
+        libsumo.vehicle.setPreviousSpeed(vehicle_id, before_mps)
+        libsumo.vehicle.slowDown(vehicle_id, after_mps, steps * self._step_s)
+
+    def change_lane_now(self, vehicle_id: str, lane: int, steps: int) -> None:
+        """Commands a lane change in the next step, without SUMO's checks."""
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
+        libsumo.vehicle.changeLane(vehicle_id, lane, (steps + 1) * self._step_s)
+
+    def everyone(self) -> tuple[list[str], list[str], list[float], list[float]]:
+        """Returns who is on the road: names, lanes, positions along them (m), speeds (m/s)."""
+        vehicle = libsumo.vehicle
+        names = list(vehicle.getIDList())
+        return (
+            names,
+            [vehicle.getLaneID(name) for name in names],
+            [vehicle.getLanePosition(name) for name in names],
+            [vehicle.getSpeed(name) for name in names],
+        )
 
     def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
         """Commands a speed from now on."""

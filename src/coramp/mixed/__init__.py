@@ -1,0 +1,1 @@
+"""Automated vehicles among drivers: who makes room for whom, and what each does on board."""

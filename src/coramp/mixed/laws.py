@@ -1,0 +1,70 @@
+"""The numbers of the laws of mixed traffic."""
+
+from typing import NamedTuple
+
+
+class FollowingLaw(NamedTuple):
+    """How an automated vehicle follows: a = k_g (gap - s_0 - T v) + k_v (v_leader - v).
+
+    ``gap_gain_ps2`` is k_g and ``speed_gain_ps`` k_v for the vehicle ahead in its lane;
+    ``courtesy_gap_gain_ps2`` and ``courtesy_speed_gain_ps`` are those for one that is yet to merge,
+    or behind which it is itself to merge. For these it brakes by at most ``courtesy_mps2``, and by
+    ``early_share`` of that while the merge is more than ``early_s`` away. ``speed_up_mps2`` is its
+    acceleration in a lane, ``merge_mps2`` that on the acceleration lane.
+    """
+
+    gap_gain_ps2: float = 0.6
+    speed_gain_ps: float = 1.0
+    courtesy_gap_gain_ps2: float = 0.2
+    courtesy_speed_gain_ps: float = 0.41
+    courtesy_mps2: float = 2.5
+    early_share: float = 0.5
+    early_s: float = 8.0
+    speed_up_mps2: float = 2.5
+    merge_mps2: float = 2.05
+
+
+class SequenceLaw(NamedTuple):
+    """How a vehicle on the ramp finds its place in the mainline's order.
+
+    A place costs ``own_weight`` a metre that the vehicle falls back itself, and a metre that the
+    vehicles behind fall back: 1 for an automated one, ``driver_weight`` for a driver, so far as the
+    fall runs on through at most ``deep`` of them. The place that it has counts ``hysteresis_m``
+    less. The mean speed of the lane from ``behind_m`` behind it to ``ahead_m`` before it is that of
+    its virtual station. Courtesy leaves vehicles at ``slowest_share`` of the lane's speed, on the
+    ramp at ``slowest_ramp_share``; close to the lane's end, from ``urgent_m`` on, at
+    ``urgent_mps``.
+    """
+
+    own_weight: float = 2.0
+    driver_weight: float = 1.5
+    hysteresis_m: float = 7.2
+    deep: float = 6.0
+    behind_m: float = 100.0
+    ahead_m: float = 117.0
+    slowest_share: float = 0.6
+    slowest_ramp_share: float = 0.9
+    urgent_m: float = 100.0
+    urgent_mps: float = 3.0
+
+
+class SafetyLaw(NamedTuple):
+    """What a vehicle keeps on board, whatever it is told, and when it changes lanes.
+
+    It stays behind a leader that brakes at ``braking_mps2`` if it reacts after ``reaction_s`` and
+    brakes at that rate too, with ``margin_m`` to spare; ``hardest_mps2`` is what its brakes can do.
+    It can stop with ``stop_mps2`` before ``lane_end_m``. A lane change leaves a driver behind
+    s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``; and asks nobody automated
+    for more than ``gentle_mps2``, at the lane's end ``gentle_at_end_mps2`` more.
+    """
+
+    braking_mps2: float = 6.0
+    reaction_s: float = 0.3
+    margin_m: float = 1.0
+    hardest_mps2: float = 8.0
+    stop_mps2: float = 2.5
+    lane_end_m: float = 197.0
+    driver_mps2: float = 4.5
+    relax_m: float = 1.5
+    gentle_mps2: float = 0.6
+    gentle_at_end_mps2: float = 3.0

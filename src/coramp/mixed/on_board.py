@@ -1,0 +1,208 @@
+"""What an automated vehicle does by itself: follows, keeps its distance, stops before a lane's end.
+
+Whatever it is told, it keeps to every leader the distance that it needs if that leader brakes at
+b: with v and v_l the two speeds,
+
+    gap - margin + v_l^2 / (2 b)  >=  v^2 / (2 b).
+
+Braking at b keeps both sides as they are, so that a vehicle that holds this now can hold it for
+ever. The acceleration that it takes lets it hold this after its reaction time too.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp.mixed.laws import FollowingLaw, SafetyLaw
+from coramp.mixed.users import NOBODY, Gaps, MixedRoad, RoadUsers, gap_m, in_order
+
+TO_CRUISE_S = 1.0
+CRUISE_BRAKING_MPS2 = 2.0
+"""A vehicle goes to the speed that it wishes within a second, and slows for that no harder."""
+TOUCHING_M = 1.5
+"""Nobody changes lanes with less than this before or behind it."""
+READY_M = 1.0
+"""The first metres of the acceleration lane are no place to change."""
+REAR_BRAKES_MPS2 = 2.0
+"""What a lane change may ask of an automated vehicle behind before its next command."""
+
+
+class Neighbours(NamedTuple):
+    """Who is ahead in one's lane, and beside a vehicle on the acceleration lane: -1 for nobody."""
+
+    leader: IntArray
+    front: IntArray
+    rear: IntArray
+
+
+@kernel
+def neighbours_of(users: RoadUsers) -> Neighbours:
+    """Returns the leader of each vehicle, and the mainline's vehicles before and behind it."""
+    count = len(users.number)
+    leader, front, rear = (np.full(count, NOBODY) for _ in range(3))
+    mainline = in_order(users.station_m, users.on_mainline)
+    ramp = in_order(users.station_m, ~users.on_mainline)
+    for k in range(1, len(mainline)):
+        leader[mainline[k]] = mainline[k - 1]
+    k = 0
+    for i in range(len(ramp)):
+        own = ramp[i]
+        if i > 0:
+            leader[own] = ramp[i - 1]
+        while k < len(mainline) and users.station_m[mainline[k]] >= users.station_m[own]:
+            k += 1
+        front[own] = mainline[k - 1] if k > 0 else NOBODY
+        rear[own] = mainline[k] if k < len(mainline) else NOBODY
+    return Neighbours(leader, front, rear)
+
+
+@kernel
+def distance_speed_mps(
+    gap_m: float, speed_mps: float, leader_mps: float, braking_mps2: float, law: SafetyLaw
+) -> float:
+    """Returns the largest speed v' (m/s) after the reaction time t that keeps the distance.
+
+    ``(v + v') t / 2 + v'^2 / (2 b) = gap - margin + v_l^2 / (2 b_l)``, with the leader's b_l and an
+    own b that is no larger; 0 where none does.
+    """
+    reaction_s = law.reaction_s
+    left_m = gap_m - law.margin_m + leader_mps**2 / (2.0 * law.braking_mps2)
+    left_m -= 0.5 * speed_mps * reaction_s
+    if left_m <= 0.0:
+        return 0.0
+    half_s = 0.5 * reaction_s
+    root_s = math.sqrt(half_s * half_s + 2.0 * left_m / braking_mps2)
+    return float(braking_mps2 * (root_s - half_s))
+
+
+@kernel
+def may_change_lane(
+    users: RoadUsers, own: int, around: Neighbours, gaps: Gaps, following: FollowingLaw,
+    law: SafetyLaw,
+) -> bool:
+    """Returns whether a lane change of a vehicle on the acceleration lane keeps all distances.
+
+    Its own to the vehicle in front; that of an automated vehicle behind, which may have to brake at
+    2 m/s2; and, of a driver behind, what he would keep and braking in comfort takes.
+    """
+    if users.on_mainline[own] or users.station_m[own] < READY_M:
+        return False
+    speed_mps, front, rear = users.speed_mps[own], around.front[own], around.rear[own]
+    share = max(0.0, users.station_m[own] / law.lane_end_m)
+    gentle_mps2 = law.gentle_mps2 + law.gentle_at_end_mps2 * share * share
+    if front >= 0:
+        free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
+        keeps_mps = distance_speed_mps(
+            free_m, speed_mps, users.speed_mps[front], users.braking_mps2[own], law
+        )
+        if free_m < TOUCHING_M or keeps_mps < speed_mps:
+            return False
+        if _follows_mps2(users, own, front, free_m, gaps, following) < -gentle_mps2:
+            return False
+    if rear < 0:
+        return True
+    free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
+    rear_mps = users.speed_mps[rear]
+    if not users.automated[rear]:
+        slower_m = max(0.0, rear_mps**2 - speed_mps**2) / (2.0 * law.driver_mps2)
+        return bool(free_m >= gap_m(False, True, rear_mps, gaps) + slower_m - law.relax_m)
+    keeps_mps = distance_speed_mps(free_m, rear_mps, speed_mps, users.braking_mps2[rear], law)
+    if free_m < TOUCHING_M or keeps_mps < rear_mps - REAR_BRAKES_MPS2 * law.reaction_s:
+        return False
+    return bool(_follows_mps2(users, rear, own, free_m, gaps, following) >= -gentle_mps2)
+
+
+@kernel
+def _follows_mps2(
+    users: RoadUsers, own: int, front: int, free_m: float, gaps: Gaps, law: FollowingLaw
+) -> float:
+    """The linear law behind a vehicle in the same lane, or one that is about to be in it."""
+    speed_mps = users.speed_mps[own]
+    error_m = free_m - gap_m(True, users.automated[front], speed_mps, gaps)
+    closing_mps = users.speed_mps[front] - speed_mps
+    return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * closing_mps)
+
+
+@kernel
+def _behind_mps2(
+    users: RoadUsers, own: int, front: int, gaps: Gaps, following: FollowingLaw, law: SafetyLaw
+) -> float:
+    """The largest acceleration (m/s2) behind a vehicle: by the linear law, and never too near."""
+    free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
+    speed_mps, braking_mps2 = users.speed_mps[own], users.braking_mps2[own]
+    keeps_mps = distance_speed_mps(free_m, speed_mps, users.speed_mps[front], braking_mps2, law)
+    wanted_mps2 = max(-braking_mps2, _follows_mps2(users, own, front, free_m, gaps, following))
+    return min(wanted_mps2, (keeps_mps - speed_mps) / law.reaction_s)
+
+
+@kernel
+def driven_mps2(
+    users: RoadUsers,
+    around: Neighbours,
+    told_mps2: FloatArray,
+    changes: BoolArray,
+    gaps: Gaps,
+    following: FollowingLaw,
+    law: SafetyLaw,
+    road: MixedRoad,
+    period_s: float,
+) -> FloatArray:
+    """Returns the acceleration (m/s2) of each automated vehicle until its next command, 0 of others.
+
+    ``told_mps2`` is the most that it is told to speed up. A vehicle that ``changes`` lanes keeps
+    its distance in both lanes, and the one behind it on the mainline does so already.
+    """
+    accel_mps2 = np.zeros(len(users.number))
+    for own in range(len(users.number)):
+        if not users.automated[own]:
+            continue
+        accel = min(told_mps2[own], _alone_mps2(users, own, following, law, road, period_s))
+        if around.leader[own] >= 0:
+            accel = min(
+                accel, _behind_mps2(users, own, around.leader[own], gaps, following, law)
+            )
+        if changes[own] and around.front[own] >= 0:
+            accel = min(accel, _behind_mps2(users, own, around.front[own], gaps, following, law))
+        accel_mps2[own] = accel
+    for own in range(len(users.number)):
+        rear = around.rear[own]
+        if changes[own] and rear >= 0 and users.automated[rear]:
+            behind_mps2 = _behind_mps2(users, rear, own, gaps, following, law)
+            accel_mps2[rear] = min(accel_mps2[rear], behind_mps2)
+    for own in range(len(users.number)):
+        speed_mps = users.speed_mps[own]
+        accel = max(-law.hardest_mps2, accel_mps2[own])
+        accel_mps2[own] = max(-speed_mps / period_s, accel) if users.automated[own] else 0.0
+    return accel_mps2
+
+
+@kernel
+def _alone_mps2(
+    users: RoadUsers,
+    own: int,
+    following: FollowingLaw,
+    law: SafetyLaw,
+    road: MixedRoad,
+    period_s: float,
+) -> float:
+    """Towards the speed that it wishes, and to a stop before the acceleration lane ends."""
+    station_m, speed_mps = users.station_m[own], users.speed_mps[own]
+    able_mps2 = min(users.acceleration_mps2[own], users.power_wpkg[own] / max(speed_mps, 0.1))
+    if users.on_mainline[own]:
+        wish_mps, up_mps2 = users.cruise_mps[own], min(able_mps2, following.speed_up_mps2)
+    elif station_m >= 0.0:
+        wish_mps, up_mps2 = users.cruise_mps[own], min(able_mps2, following.merge_mps2)
+    else:
+        wish_mps = min(users.cruise_mps[own], road.ramp_speed_mps)
+        up_mps2 = min(able_mps2, following.speed_up_mps2)
+    accel = min(up_mps2, max(-CRUISE_BRAKING_MPS2, (wish_mps - speed_mps) / TO_CRUISE_S))
+    accel = min(accel, (users.cruise_mps[own] - speed_mps) / period_s)
+    if not users.on_mainline[own]:
+        left_m = max(0.0, law.lane_end_m - station_m)
+        stops_mps = math.sqrt(2.0 * law.stop_mps2 * left_m)
+        accel = min(accel, (stops_mps - speed_mps) / period_s)
+        if station_m < 0.0:
+            accel = min(accel, (road.ramp_limit_mps - speed_mps) / period_s)
+    return float(accel)
