@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp.audit.replay import replayed
-from coramp.messages.reading import PLACES, read_log
+from coramp.messages.log_reader import PLACES, read_log
 from coramp.strategies.registry import strategies, strategy_named
 from tests.messages.test_service import listed
 

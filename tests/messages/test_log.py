@@ -8,7 +8,7 @@ from coramp.errors import CorampError
 from coramp.messages.commands import Enter, Follow, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.messages.log import LOG_VERSION, MESSAGES, NO_POSITIONS, Positions, Told, as_frame
-from coramp.messages.reading import read_log
+from coramp.messages.log_reader import read_log
 
 STEP_S = 0.1
 CRUISE = np.array([[0.5, -1000.0, 20.0, 0.0]])

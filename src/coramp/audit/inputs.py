@@ -11,7 +11,7 @@ from coramp.audit.orders import Askers, Orders
 from coramp.checker.merging import NOT_COMMANDED, ON_IT_AT_ENTRY
 from coramp.messages.commands import Command, Enter, SetSignal
 from coramp.messages.log import COMMAND, ENTRY, TRAIT_COLUMNS
-from coramp.messages.reading import MessageLog, read_log
+from coramp.messages.log_reader import MessageLog, read_log
 from coramp.records.run import MESSAGES, RunRecords
 from coramp.records.run_folder import read_run
 from coramp.road.streams import STREAMS

@@ -11,7 +11,7 @@ from coramp.messages.commands import Command, SetSignal
 from coramp.messages.events import DetectorReading, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.messages.log import KINDS, READING, REPORT, TRAIT_COLUMNS
-from coramp.messages.reading import MessageLog
+from coramp.messages.log_reader import MessageLog
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider
