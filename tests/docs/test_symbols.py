@@ -43,7 +43,7 @@ FILES = {
     "attempts.parquet": schemas.ATTEMPTS,
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
-    "streams.parquet": schemas.STREAMS,
+    "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": MESSAGES,
 }
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}

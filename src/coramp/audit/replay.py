@@ -7,7 +7,7 @@ import numpy as np
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.service import Service
 from coramp.messages.channel import Channel
-from coramp.messages.commands import Command, SetSignal
+from coramp.messages.commands import SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.messages.log import KINDS, READING, REPORT, TRAIT_COLUMNS
@@ -21,7 +21,7 @@ from coramp.vehicles.traits import Traits
 class Replayed(NamedTuple):
     """What a fresh coordinator commanded, and the coordinator."""
 
-    commands: list[Command]
+    commands: list[WorldCommand]
     coordinator: Coordinator
 
 

@@ -6,8 +6,8 @@ from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.drivers import DriverRoad
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
-from coramp.messages.commands import Command
-from coramp.messages.events import DetectorReading, Event, Report, RequestToEnter
+from coramp.messages.commands import WorldCommand
+from coramp.messages.events import Acknowledgement, DetectorReading, Event, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules
 from coramp.strategies.base import Decider, is_metered
@@ -39,7 +39,7 @@ class Service:
         )
         self.coordinator.expect_arrivals()
 
-    def handle(self, events: Iterable[Event], step: int) -> tuple[Command, ...]:
+    def handle(self, events: Iterable[Event], step: int) -> tuple[WorldCommand, ...]:
         """Returns what is commanded up to and including ``step``, the events being those by then.
 
         A reading of the road's loops has the strategy asked at its step. Raises CorampError for a

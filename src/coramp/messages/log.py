@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.messages.commands import Command, Enter, SetSignal
+from coramp.messages.commands import Enter, SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.road.streams import STREAMS
 from coramp.vehicles.merge_state import is_planned
@@ -92,7 +92,7 @@ class Told(NamedTuple):
     """All that was told in a run that ended at ``end_step``."""
 
     requests: Sequence[RequestToEnter]
-    commands: Sequence[Command]
+    commands: Sequence[WorldCommand]
     positions: Positions
     readings: Sequence[DetectorReading]
     end_step: int
@@ -184,7 +184,7 @@ def _traits(request: RequestToEnter) -> dict[str, Any]:
     return {name: value for name, value in known if np.isfinite(value)}
 
 
-def _command(command: Command, step_s: float) -> list[dict[str, Any]]:
+def _command(command: WorldCommand, step_s: float) -> list[dict[str, Any]]:
     """Returns the row of a command, and of its acknowledgement where there is one."""
     time_s = command.step * step_s
     if isinstance(command, SetSignal):

@@ -20,7 +20,7 @@ from coramp.scenarios.checks import problems_of
 from coramp.scenarios.sections import (
     FASTEST_MPS,
     Controller,
-    Drivers,
+    DriverPopulation,
     ExplicitArrival,
     Mainline,
     Model,
@@ -63,7 +63,7 @@ class Scenario(Model):
     safety: Safety = Safety()
     motion: Motion = Motion()
     control: Controller = Controller()
-    drivers: dict[str, Drivers] = Field(default_factory=dict)
+    drivers: dict[str, DriverPopulation] = Field(default_factory=dict)
     simulation: Simulation = Simulation()
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = Field(default_factory=dict)

@@ -144,7 +144,7 @@ DriverGaps = Annotated[
 ]
 
 
-class Drivers(Model):
+class DriverPopulation(Model):
     """A population of ordinary drivers for uncontrolled runs, in SUMO's terms.
 
     ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and
