@@ -10,7 +10,6 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
 from coramp.coordination.service import Service
 from coramp.demand.arrivals import arrivals_of
@@ -22,6 +21,7 @@ from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.lanes import first_on_mainline_s, seen_history
 from coramp.records.outcome import Outcome, Pieces, until_s
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
