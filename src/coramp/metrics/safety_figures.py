@@ -21,7 +21,6 @@ from coramp.metrics.separations import (
     VIOLATION_COUNT,
     lane_extremes,
 )
-from coramp.metrics.separations import VIOLATIONS as COUNT
 from coramp.metrics.types import traits_of
 from coramp.records.outcome import Outcome
 from coramp.records.schemas import VIOLATIONS, Row

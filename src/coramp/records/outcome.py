@@ -37,6 +37,10 @@ class Passages:
     def __len__(self) -> int:
         return len(self.vehicle_id)
 
+    def types(self) -> tuple[str, ...]:
+        """Returns the name of each vehicle's type: a car's where types were left out."""
+        return self.vehicle_type or (CAR,) * len(self)
+
 
 @dataclass(frozen=True)
 class Pieces:
