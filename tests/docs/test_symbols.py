@@ -9,7 +9,7 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
-from coramp.messages.log import MESSAGES
+from coramp.messages.kinds import MESSAGES
 from coramp.records import schemas
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.defaults import DERIVED
