@@ -101,6 +101,13 @@ def test_what_does_not_fit_is_refused_in_one_line(tables, line):
     assert problems(*tables) == [line]
 
 
+@pytest.mark.parametrize("name", [["car"], {"a": 1}, 3])
+def test_a_name_that_is_no_text_is_refused(name):
+    (line,) = problems({"name": name, "share": 1.0})
+    assert line.startswith("vehicle.0.name: ")
+    assert line.endswith("input should be a valid string")
+
+
 def test_a_type_longer_than_the_acceleration_lane_is_refused():
     short = {"ramp.acceleration_lane_m": 35.0}
     found = problems(CAR, {**TRUCK, "length_m": 36.0}, **short)

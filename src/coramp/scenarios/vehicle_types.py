@@ -79,7 +79,8 @@ class VehicleType(BaseModel):
         """Fills in what a built-in type has; a single top speed is one for all."""
         if not isinstance(data, dict):
             return data
-        data = {**BUILT_IN.get(data.get("name", ""), {}), **data}
+        name = data.get("name")
+        data = {**(BUILT_IN.get(name, {}) if isinstance(name, str) else {}), **data}
         top = data.get("top_speed_mps")
         if isinstance(top, int | float) and not isinstance(top, bool):
             data["top_speed_mps"] = (float(top), float(top))
