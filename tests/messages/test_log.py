@@ -91,6 +91,27 @@ def test_everything_stands_in_the_order_in_which_it_was_told():
     ]
 
 
+def test_the_kinds_of_version_2():
+    """Whoever changes these raises ``LOG_VERSION``."""
+    position = {"vehicle_id", "of_s", "station_m", "speed_mps", "std_m"}
+    trajectory = {"vehicle_id"} | {
+        f"piece_{name}" for name in ("time_s", "station_m", "speed_mps", "accel_mps2")
+    }
+    expected = {
+        "report": (0, position),
+        "comparison": (4, position),
+        "reading": (1, {"mainline_occupancy", "queue_occupancy", "passed_veh"}),
+        "request": (2, {"vehicle_id", "stream", "speed_mps", "length_m", "vehicle_type"}),
+        "entry": (3, trajectory),
+        "command": (3, trajectory),
+        "acknowledgement": (3, {"vehicle_id", "of_s"}),
+        "signal": (3, {"green"}),
+        "end": (5, set()),
+    }
+    assert LOG_VERSION == 2
+    assert {name: (kind.place, set(kind.needs)) for name, kind in KINDS.items()} == expected
+
+
 def test_each_message_has_the_columns_of_its_kind():
     frame, seen = every_kind(), set()
     for row in frame.iter_rows(named=True):
