@@ -2,7 +2,9 @@
 
 import time
 from statistics import quantiles
+from typing import Any
 
+from coramp.mixed.situation import Places, Situation, Steering
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -29,6 +31,21 @@ class Timed:
         started = time.perf_counter()
         try:
             return self._strategy.decide(view, memory)
+        finally:
+            self._taken_s.append(time.perf_counter() - started)
+
+    @property
+    def decision_s(self) -> float:
+        """The time (s) between two decisions of a strategy for mixed traffic."""
+        return float(getattr(self._strategy, "decision_s"))  # noqa: B009 - not all have it
+
+    def steer(self, situation: Situation, places: Places) -> Steering:
+        """Returns what a strategy for mixed traffic answers."""
+        started = time.perf_counter()
+        try:
+            steers: Any = self._strategy
+            answer: Steering = steers.steer(situation, places)
+            return answer
         finally:
             self._taken_s.append(time.perf_counter() - started)
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from coramp._kernel import FloatArray, IntArray
+from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.messages.log import as_frame
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.fitting import fitted_pieces
 from coramp.metrics.frames import decisions_table, frame_of, trajectories_table
 from coramp.metrics.lane_figures import bound_figures, braking_figures
+from coramp.metrics.mixed_figures import mixed_figures, safety_events
 from coramp.metrics.motion import (
     BIN_S,
     binned_motion,
@@ -71,6 +72,7 @@ class RunTables:
             "types": self.types,
             "attempts": self.attempts,
             "messages": self.messages,
+            "safety_events": self.safety_events,
         }
         return {name: frame for name, frame in every.items() if frame is not None}
 
@@ -80,7 +82,7 @@ class RunTables:
         columns = dict(self.vehicle_columns)
         columns["stream"] = _stream_names(columns["stream"])
         traits = trait_columns(traits_of(self.outcome.passages, self.scenario))
-        return frame_of(VEHICLES, **columns, **traits)
+        return frame_of(VEHICLES, **columns, **traits, automated=_automated(self.outcome))
 
     @cached_property
     def speeds(self) -> pl.DataFrame:
@@ -131,6 +133,13 @@ class RunTables:
         return violations_table(self.outcome, self.scenario, self.metrics["safety_violations"])
 
     @cached_property
+    def safety_events(self) -> pl.DataFrame | None:
+        """One row per collision, broken assumption and broken promise, in mixed traffic alone."""
+        if self.outcome.passages.automated is None:
+            return None
+        return safety_events(self.outcome, self.scenario)
+
+    @cached_property
     def decisions(self) -> pl.DataFrame | None:
         """One row a decision."""
         outcome = self.outcome
@@ -150,6 +159,13 @@ class RunTables:
         return attempts_table(outcome.decisions, outcome.refusals, names, of_row)
 
 
+def _automated(outcome: Outcome) -> BoolArray:
+    """Which vehicles took commands: all or none, but in mixed traffic."""
+    if outcome.passages.automated is not None:
+        return outcome.passages.automated
+    return np.full(len(outcome.passages), outcome.cooperative)
+
+
 def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
     """Returns all tables and figures of a run."""
     vehicles, speeds = vehicle_columns(outcome, scenario), speed_columns(outcome)
@@ -161,6 +177,7 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **bound_figures(outcome, scenario, vehicles["delay_s"], vehicles["free_flow_s"]),
         **braking_figures(outcome, scenario),
         **queue_figures(outcome, scenario),
+        **mixed_figures(outcome, scenario, vehicles["delay_s"]),
     }
     return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 
@@ -200,7 +217,7 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
         ),
         "finished": finished,
         "plan_error_m": passages.plan_error_m,
-        "vehicle_type": passages.vehicle_type or ("car",) * len(passages),
+        "vehicle_type": passages.types(),
     }
 
 

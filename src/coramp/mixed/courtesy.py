@@ -33,7 +33,7 @@ def courtesy_mps2(
             continue
         if not (order.virtual[k] or order.virtual[k - 1]):
             continue
-        wanted_mps2 = _wanted_mps2(users, order, k, gaps, following, road)
+        wanted_mps2 = _wanted_mps2(users, order, k, gaps, following)
         merge_in_s = order.merge_in_s[own if order.virtual[k] else front]
         share = following.early_share if merge_in_s > following.early_s else 1.0
         wanted_mps2 = max(wanted_mps2, -following.courtesy_mps2 * share)
@@ -52,7 +52,6 @@ def _wanted_mps2(
     k: int,
     gaps: Gaps,
     law: FollowingLaw,
-    road: MixedRoad,
 ) -> float:
     """The linear law behind the vehicle ahead in the order, at virtual stations."""
     own, front = order.place[k], order.place[k - 1]
@@ -85,7 +84,7 @@ def _floor_mps(
     if order.virtual[k]:
         return float(law.slowest_ramp_share * min(road.ramp_speed_mps, order.lane_mps[own]))
     station_m, speed_mps = users.station_m[front], users.speed_mps[front]
-    slow = 0.0 < station_m and speed_mps < law.slowest_share * road.ramp_speed_mps
+    slow = station_m > 0.0 and speed_mps < law.slowest_share * road.ramp_speed_mps
     if slow or station_m > law.urgent_m:
         return float(law.urgent_mps)
     return float(law.slowest_share * order.lane_mps[front])

@@ -41,7 +41,7 @@ class Neighbours(NamedTuple):
 def neighbours_of(users: RoadUsers) -> Neighbours:
     """Returns the leader of each vehicle, and the mainline's vehicles before and behind it."""
     count = len(users.number)
-    leader, front, rear = (np.full(count, NOBODY) for _ in range(3))
+    leader, front, rear = np.full(count, NOBODY), np.full(count, NOBODY), np.full(count, NOBODY)
     mainline = in_order(users.station_m, users.on_mainline)
     ramp = in_order(users.station_m, ~users.on_mainline)
     for k in range(1, len(mainline)):
@@ -79,7 +79,11 @@ def distance_speed_mps(
 
 @kernel
 def may_change_lane(
-    users: RoadUsers, own: int, around: Neighbours, gaps: Gaps, following: FollowingLaw,
+    users: RoadUsers,
+    own: int,
+    around: Neighbours,
+    gaps: Gaps,
+    following: FollowingLaw,
     law: SafetyLaw,
 ) -> bool:
     """Returns whether a lane change of a vehicle on the acceleration lane keeps all distances.
@@ -106,8 +110,9 @@ def may_change_lane(
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        slower_m = max(0.0, rear_mps**2 - speed_mps**2) / (2.0 * law.driver_mps2)
-        return bool(free_m >= gap_m(False, True, rear_mps, gaps) + slower_m - law.relax_m)
+        braking_m = (rear_mps**2 - speed_mps**2) / (2.0 * law.driver_mps2)
+        needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
+        return bool(free_m >= max(TOUCHING_M, needs_m))
     keeps_mps = distance_speed_mps(free_m, rear_mps, speed_mps, users.braking_mps2[rear], law)
     if free_m < TOUCHING_M or keeps_mps < rear_mps - REAR_BRAKES_MPS2 * law.reaction_s:
         return False
@@ -134,7 +139,7 @@ def _behind_mps2(
     speed_mps, braking_mps2 = users.speed_mps[own], users.braking_mps2[own]
     keeps_mps = distance_speed_mps(free_m, speed_mps, users.speed_mps[front], braking_mps2, law)
     wanted_mps2 = max(-braking_mps2, _follows_mps2(users, own, front, free_m, gaps, following))
-    return min(wanted_mps2, (keeps_mps - speed_mps) / law.reaction_s)
+    return float(min(wanted_mps2, (keeps_mps - speed_mps) / law.reaction_s))
 
 
 @kernel
@@ -149,7 +154,7 @@ def driven_mps2(
     road: MixedRoad,
     period_s: float,
 ) -> FloatArray:
-    """Returns the acceleration (m/s2) of each automated vehicle until its next command, 0 of others.
+    """Returns the acceleration (m/s2) of each automated vehicle for one period, 0 of others.
 
     ``told_mps2`` is the most that it is told to speed up. A vehicle that ``changes`` lanes keeps
     its distance in both lanes, and the one behind it on the mainline does so already.
@@ -160,9 +165,7 @@ def driven_mps2(
             continue
         accel = min(told_mps2[own], _alone_mps2(users, own, following, law, road, period_s))
         if around.leader[own] >= 0:
-            accel = min(
-                accel, _behind_mps2(users, own, around.leader[own], gaps, following, law)
-            )
+            accel = min(accel, _behind_mps2(users, own, around.leader[own], gaps, following, law))
         if changes[own] and around.front[own] >= 0:
             accel = min(accel, _behind_mps2(users, own, around.front[own], gaps, following, law))
         accel_mps2[own] = accel

@@ -35,10 +35,13 @@ class Steering(NamedTuple):
 class MixedStrategy(Protocol):
     """A strategy for automated vehicles among drivers.
 
-    ``decision_s`` is the time between two decisions. ``steer`` is a pure function, as ``decide`` is.
+    ``steer`` is a pure function, as ``decide`` is.
     """
 
-    decision_s: float
+    @property
+    def decision_s(self) -> float:
+        """The time (s) between two decisions."""
+        ...
 
     def steer(self, situation: Situation, places: Places) -> Steering:
         """Returns bounds for all automated vehicles; ``places`` are those of its last answer."""

@@ -67,9 +67,7 @@ def gap_m(rear_automated: bool, front_automated: bool, speed_mps: float, gaps: G
 
 
 @kernel
-def gap_for_m(
-    rear_automated: bool, merging_automated: bool, speed_mps: float, gaps: Gaps
-) -> float:
+def gap_for_m(rear_automated: bool, merging_automated: bool, speed_mps: float, gaps: Gaps) -> float:
     """Returns the distance (m) to leave behind a vehicle that is to merge ahead."""
     if rear_automated and not merging_automated:
         return float(gaps.for_driver_m + gaps.for_driver_s * speed_mps)

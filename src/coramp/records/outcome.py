@@ -8,10 +8,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.decision_log import DecisionRecord, Refusal
 from coramp.messages.log import Told
 from coramp.records.lanes import LaneHistory
-from coramp.vehicles.traits import Traits
-
-LANES = ("ramp", "acceleration", "mainline")
-"""Names of the lane codes of ``coordination.driven``."""
+from coramp.vehicles.traits import CAR, Traits
 
 
 @dataclass(frozen=True)
@@ -21,6 +18,7 @@ class Passages:
     ``merge_s`` is when a ramp vehicle changed to the mainline, ``BY_MAINLINE_S`` of
     ``vehicles.merge_state`` for mainline vehicles. ``entry_speed_mps`` is the scheduled one.
     ``plan_error_m`` is the largest distance seen between plan and simulator, nan without a plan.
+    ``automated`` tells, where drivers and automated vehicles mix, which are automated.
     ``traits`` are None for vehicles that only the common limits bind; types and traits may be left
     out where that is so for all.
     """
@@ -36,9 +34,14 @@ class Passages:
     plan_error_m: FloatArray
     vehicle_type: tuple[str, ...] = ()
     traits: tuple[Traits | None, ...] = ()
+    automated: BoolArray | None = None
 
     def __len__(self) -> int:
         return len(self.vehicle_id)
+
+    def types(self) -> tuple[str, ...]:
+        """Returns the name of each vehicle's type: a car's where types were left out."""
+        return self.vehicle_type or (CAR,) * len(self)
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,8 @@ class Outcome:
     simulator made of it; for its own drivers both are its steps. ``lanes`` is who was on which lane
     when, as driven. ``end_s`` is when the run ended or was cut off. Decisions name vehicles by rows
     of the ledger; ``vehicle_of_row`` gives their places in ``passages``. ``told`` are the messages,
-    where they were to be kept.
+    where they were to be kept. ``drivers`` names their population; ``collided`` are those whom the
+    simulator saw collide: time (s), places of rear and front vehicle. Both are for mixed traffic.
     """
 
     cooperative: bool
@@ -77,6 +81,8 @@ class Outcome:
     interventions: int = 0
     vehicle_of_row: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     told: Told | None = None
+    drivers: str = ""
+    collided: tuple[tuple[float, int, int], ...] = ()
 
     @property
     def until_s(self) -> FloatArray:

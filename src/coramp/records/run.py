@@ -18,6 +18,7 @@ TABLES = (
     "violations",
     "types",
     "attempts",
+    "safety_events",
 )
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
 MESSAGES = "messages"
@@ -32,7 +33,7 @@ class RunRecords:
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
     positions, attempts and figures by type (of runs with several types) are None where a coramp
     that kept none wrote the run, messages where they were not to be kept, and in a run that was
-    read.
+    read. There are safety events of mixed traffic alone.
     """
 
     content: Row
@@ -46,6 +47,7 @@ class RunRecords:
     messages: pl.DataFrame | None = None
     types: pl.DataFrame | None = None
     attempts: pl.DataFrame | None = None
+    safety_events: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:

@@ -8,7 +8,7 @@ Row = dict[str, Any]
 """One row of a table, by column."""
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 6
+RESULT_VERSION = 7
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -35,6 +35,7 @@ VEHICLES: Schema = {
     "power_wpkg": pl.Float64,
     "braking_mps2": pl.Float64,
     "mass_kg": pl.Float64,
+    "automated": pl.Boolean,
 }
 
 TYPES: Schema = {
@@ -117,6 +118,13 @@ VIOLATIONS: Schema = {
     "margin_m": pl.Float64,
 }
 
+SAFETY_EVENTS: Schema = {
+    "time_s": pl.Float64,
+    "event": pl.String,
+    "rear_vehicle_id": pl.String,
+    "front_vehicle_id": pl.String,
+}
+
 SPEEDS: Schema = {
     "stream": pl.String,
     "time_s": pl.Float64,
@@ -185,7 +193,22 @@ _LATER_METRICS: Schema = {
 }
 """They stand at the end of ``runs.parquet``, so that what was there keeps its place."""
 
-RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS}
+MIXED_METRICS: Schema = {
+    "automated_vehicles": pl.Int64,
+    "automated_delay_s": pl.Float64,
+    "driver_delay_s": pl.Float64,
+    "automated_hard_brakings_3": pl.Int64,
+    "driver_hard_brakings_3": pl.Int64,
+    "ramp_stops": pl.Int64,
+    "collisions_by_automated": pl.Int64,
+    "collisions_by_driver": pl.Int64,
+    "collisions_among_drivers": pl.Int64,
+    "broken_assumptions": pl.Int64,
+    "automated_violations": pl.Int64,
+}
+"""Figures of automated vehicles among drivers, null in other runs."""
+
+RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS, **MIXED_METRICS}
 
 RUNS: Schema = {
     "run_id": pl.String,
@@ -199,13 +222,14 @@ RUNS: Schema = {
     "planning_p95_s": pl.Float64,
     **_LATER_METRICS,
     "settings": pl.String,
+    **MIXED_METRICS,
 }
 """``settings`` are the overrides as JSON, a dotted key each; ``overrides`` shows them."""
 PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
 MEASURED = ("wall_s", *PLANNING_TIMES)
 """Columns that hold wall times: all that differs between equal runs."""
 
-STREAMS: Schema = {
+STREAM_ROWS: Schema = {
     "run_id": pl.String,
     "stream": pl.String,
     "flow_veh_h": pl.Float64,

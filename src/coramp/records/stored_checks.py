@@ -15,6 +15,7 @@ from coramp.records.schemas import (
     RESULT_VERSION,
     RUN_KEYS,
     RUNS,
+    SAFETY_EVENTS,
     SPEEDS,
     TRAJECTORIES,
     TYPES,
@@ -35,6 +36,7 @@ SCHEMAS: dict[str, Schema] = {
     "violations": VIOLATIONS,
     "types": TYPES,
     "attempts": ATTEMPTS,
+    "safety_events": SAFETY_EVENTS,
 }
 """The columns of a run's tables."""
 _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {

@@ -17,6 +17,7 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
+from coramp.runs.mixed import broken_among_drivers, check_mixed
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
@@ -26,15 +27,14 @@ from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merg
 from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
-from coramp.worlds.sumo.engine import (
-    LARGEST_PLAN_ERROR_M,
-    run_cooperative,
-    run_uncontrolled,
-)
+from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M, run_cooperative
 from coramp.worlds.sumo.files import SumoOptions
+from coramp.worlds.sumo.mixed import run_mixed
+from coramp.worlds.sumo.uncontrolled import run_uncontrolled
 
 ENGINES = ("sumo", "exact")
 DEFAULT_DRIVERS = "fair"
+UNCONTROLLED = "uncontrolled"
 FLOW_KEYS = ("mainline.flow_veh_h", "ramp.flow_veh_h")
 OPTIONS = {
     "mainline.flow_veh_h": "--mainline",
@@ -88,6 +88,12 @@ class RunSpec:
     def seed_matters(self) -> bool:
         """Whether another seed is another run: not where all is listed and nobody is a driver."""
         return self.drivers is not None or not self.scenario.arrivals
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether a strategy coordinates automated vehicles among drivers."""
+        coordinates = strategy_named(self.strategy).cooperative
+        return coordinates and self.scenario.is_mixed and self.scenario.has_automated
 
     @property
     def settings(self) -> str | None:
@@ -147,9 +153,11 @@ def make_spec(
     if is_metered(chosen) and loaded.signal_problem:
         raise CorampError(loaded.signal_problem)
     population = None
-    if drivers is not None or not chosen.cooperative:
-        population = drivers_checked(loaded, drivers or DEFAULT_DRIVERS)
-    if chosen.cooperative:
+    if drivers is not None or not chosen.cooperative or loaded.is_mixed:
+        population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
+    if loaded.is_mixed:
+        check_mixed(loaded, chosen, engine, population or "")
+    elif chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
 
@@ -204,13 +212,16 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
     options = options or SumoOptions()
     started = time.perf_counter()
     name = spec.strategy
-    strategy = Timed(strategy_to_run(name, spec.scenario.strategy.get(name)))
+    strategy = Timed(strategy_to_run(*_strategy_of(spec)))
     if spec.engine == "exact":
         outcome = run_exact(spec.scenario, strategy, spec.seed, options.keep_messages)
-    elif strategy_named(name).cooperative:
+    elif spec.is_mixed:
+        population = spec.drivers or spec.scenario.traffic.drivers
+        outcome = run_mixed(spec.scenario, strategy, population, spec.seed, options)
+    elif strategy_named(name).cooperative and spec.drivers is None:
         outcome = run_cooperative(spec.scenario, strategy, spec.seed, options)
     else:
-        drivers = spec.scenario.drivers[spec.drivers or DEFAULT_DRIVERS]
+        drivers = spec.drivers or spec.scenario.traffic.drivers
         outcome = run_uncontrolled(spec.scenario, strategy, drivers, spec.seed, options)
     tables = tables_of(outcome, spec.scenario)
     row = {
@@ -224,6 +235,13 @@ def execute(spec: RunSpec, options: SumoOptions | None = None) -> tuple[RunTable
         "settings": spec.settings,
     }
     return tables, row
+
+
+def _strategy_of(spec: RunSpec) -> tuple[str, Mapping[str, Any] | None]:
+    """The strategy of a run and its parameters; none coordinates where nobody is automated."""
+    coordinates = strategy_named(spec.strategy).cooperative
+    name = UNCONTROLLED if coordinates and spec.drivers and not spec.is_mixed else spec.strategy
+    return name, spec.scenario.strategy.get(name)
 
 
 def recorded(
@@ -264,8 +282,10 @@ def failed_row(spec: RunSpec, error: str, wall_s: float) -> Row:
 
 def broken_promises(row: Mapping[str, Any]) -> list[str]:
     """Returns in words what a cooperative run promised and did not keep; nothing for others."""
-    if row["status"] != "ok" or row["drivers"] is not None:
+    if row["status"] != "ok":
         return []
+    if row["drivers"] is not None:
+        return broken_among_drivers(row)
     broken = []
     if row["collisions"]:
         broken.append(f"{row['collisions']} collisions in SUMO")

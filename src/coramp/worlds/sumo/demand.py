@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from coramp._kernel import BoolArray
 from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Drivers, Vehicle
+from coramp.scenarios.sections import DriverPopulation, Vehicle
 from coramp.vehicles.traits import CAR
-from coramp.worlds.sumo.traits import Traits
+from coramp.worlds.sumo.traits import DriverTraits
 
 FASTEST_COMMAND_MPS = 100.0
 """The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
@@ -77,9 +77,9 @@ def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_veh
 
 def driver_routes(
     scenario: Scenario,
-    drivers: Drivers,
+    drivers: DriverPopulation,
     arrivals: Sequence[Arrival],
-    traits: Sequence[Traits],
+    traits: Sequence[DriverTraits],
     metered: bool = False,
     automated: Automated | None = None,
 ) -> str:
@@ -96,7 +96,10 @@ def driver_routes(
     for k, (arrival, own) in enumerate(zip(arrivals, traits, strict=True)):
         if automated is not None and automated.vehicles[k]:
             name, line = _automated_type(scenario, arrival, automated)
-            entry_mps = min(arrival.speed_mps, automated_cruise_mps(scenario, arrival))
+            allowed_mps = automated_cruise_mps(scenario, arrival)
+            if arrival.on_ramp and drivers.wish == "free-flow":  # the limit of the ramp's edge
+                allowed_mps = min(allowed_mps, scenario.ramp.speed_mps)
+            entry_mps = min(arrival.speed_mps, allowed_mps)
             types[name] = line
             vehicles.append(_vehicle(arrival, name, entry_mps, scenario.control.step_s))
             continue
@@ -128,9 +131,7 @@ def automated_cruise_mps(scenario: Scenario, arrival: Arrival) -> float:
     return min(scenario.mainline.speed_mps, _top_mps(arrival))
 
 
-def _automated_type(
-    scenario: Scenario, arrival: Arrival, automated: Automated
-) -> tuple[str, str]:
+def _automated_type(scenario: Scenario, arrival: Arrival, automated: Automated) -> tuple[str, str]:
     """Returns an automated vehicle's type in SUMO, by name and line: Krauss without imperfection.
 
     Drivers judge gaps to it by its ``tau`` and ``minGap``, which are what it keeps.
@@ -150,7 +151,7 @@ def _top_mps(arrival: Arrival) -> float:
     return math.inf if arrival.traits is None else arrival.traits.top_speed_mps
 
 
-def _ability(drivers: Drivers, arrival: Arrival) -> str:
+def _ability(drivers: DriverPopulation, arrival: Arrival) -> str:
     """Returns how a driver's vehicle accelerates where its type says so; else it is as SUMO has it.
 
     SUMO takes a profile of speeds (m/s) and accelerations for a vehicle of limited power.
@@ -172,14 +173,14 @@ def _ability(drivers: Drivers, arrival: Arrival) -> str:
     return told
 
 
-def _wish(drivers: Drivers, wish_mps: float) -> str:
+def _wish(drivers: DriverPopulation, wish_mps: float) -> str:
     """With factors the top speed is the highest wish that there can be, and so binds nobody."""
     if drivers.speed_factor is None:
         return f'maxSpeed="{wish_mps!r}" speedFactor="1" speedDev="0"'
     return f'maxSpeed="{drivers.speed_factor.high * wish_mps!r}"'
 
 
-def _manners(drivers: Drivers, tau_s: float) -> str:
+def _manners(drivers: DriverPopulation, tau_s: float) -> str:
     model = drivers.car_following
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (

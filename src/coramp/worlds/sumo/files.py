@@ -32,6 +32,11 @@ class Samples:
     station_m: FloatArray
     speed_mps: FloatArray
 
+    @property
+    def motion(self) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+        """Vehicles, times, stations and speeds."""
+        return self.vehicle, self.time_s, self.station_m, self.speed_mps
+
 
 @dataclass(frozen=True)
 class SumoOptions:
@@ -120,6 +125,15 @@ class RunFiles:
         root = ET.parse(self._folder / "collisions.xml").getroot()
         pairs = {(c.get("collider"), c.get("victim")) for c in root.iter("collision")}
         return len(pairs)
+
+    def collided(self, arrivals: Sequence[Arrival]) -> tuple[tuple[float, int, int], ...]:
+        """Returns whom SUMO saw collide: time (s), places of rear and front vehicle."""
+        number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
+        root = ET.parse(self._folder / "collisions.xml").getroot()
+        return tuple(
+            (float(c.get("time", "0")), number[c.get("collider", "")], number[c.get("victim", "")])
+            for c in root.iter("collision")
+        )
 
     def finished(self) -> set[str]:
         """Returns the vehicles that left the network."""

@@ -16,12 +16,12 @@ from coramp.mixed.situation import MixedStrategy, Places, Situation
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers
 from coramp.records.outcome import Outcome
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Drivers
+from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import steps_of_period
 from coramp.vehicles.traits import Traits
 from coramp.worlds.outcomes import cap_step_of
+from coramp.worlds.sumo.as_driven import outcome_as_driven
 from coramp.worlds.sumo.demand import Automated, automated_cruise_mps, driver_routes
-from coramp.worlds.sumo.drivers import outcome_of_samples
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
 from coramp.worlds.sumo.network import RAMP_LANES, driver_road_plan
 from coramp.worlds.sumo.session import Session
@@ -38,9 +38,10 @@ TRUCK_BRAKING_MPS2 = 5.0
 STAYS_IN_LANE = 'lcCooperative="1" lcAssertive="0.001"'
 """It accepts no gap by itself, and SUMO's drivers yield to it as to one another."""
 MERGE_LANE = "merge_0"
+FOLLOWING = FollowingLaw()
 
 
-def gaps_of(scenario: Scenario, drivers: Drivers) -> Gaps:
+def gaps_of(scenario: Scenario, drivers: DriverPopulation) -> Gaps:
     """Returns which gaps vehicles keep: automated ones those of ``[safety]``."""
     own_m, own_s = scenario.safety.standstill_gap_m, scenario.safety.time_gap_s
     theirs_m, theirs_s = drivers.min_gap_m, max(drivers.taus_s)
@@ -81,11 +82,12 @@ def automated_types(scenario: Scenario, automated: BoolArray, law: SafetyLaw) ->
 def run_mixed(
     scenario: Scenario,
     strategy: MixedStrategy,
-    drivers: Drivers,
+    population: str,
     seed: int,
     options: SumoOptions,
 ) -> Outcome:
     """Returns what happened with automated vehicles under a strategy, and drivers beside them."""
+    drivers = scenario.drivers[population]
     arrivals = arrivals_of(scenario, seed)
     plan = driver_road_plan(scenario, drivers)
     law, step_s = safety_law_of(scenario), scenario.control.step_s
@@ -107,9 +109,12 @@ def run_mixed(
             Control(scenario, strategy, gaps_of(scenario, drivers), law, hears).drive(
                 plant, cap_step_of(scenario)
             )
-        outcome = outcome_of_samples(scenario, arrivals, files, options)
+        files.keep()
+        samples, finished = files.samples(arrivals), files.finished()
+        collisions, collided = files.collisions(), files.collided(arrivals)
+    outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
     passages = replace(outcome.passages, plan_error_m=plant.largest_error_m, automated=automated)
-    return replace(outcome, passages=passages)
+    return replace(outcome, passages=passages, drivers=population, collided=collided)
 
 
 @dataclass(frozen=True)
@@ -177,11 +182,11 @@ class MixedPlant:
 
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who is on the acceleration lane, and all that is on the road."""
-        names, lanes, position_m, speed_mps = self.session.everyone()
+        names, lanes, position_m, sumo_mps = self.session.everyone()
         number = np.array([self.able.number[name] for name in names], np.int64)
         start_m = np.array([self.lane_starts_m[lane] for lane in lanes])
         station_m = start_m + np.array(position_m)
-        speed_mps = self._known_speeds(number, station_m, np.array(speed_mps))
+        speed_mps = self._known_speeds(number, station_m, np.array(sumo_mps))
         users = RoadUsers(
             number,
             station_m,
@@ -219,9 +224,7 @@ class MixedPlant:
         accel = (after_mps - before_mps) / period_s
         new = np.isnan(self._sent_mps[number])
         self._sent_mps[number] = after_mps
-        self._sent_m[number] = (
-            users.station_m[own] + 0.5 * (before_mps + after_mps) * period_s
-        )
+        self._sent_m[number] = users.station_m[own] + 0.5 * (before_mps + after_mps) * period_s
         for k, i in enumerate(own.tolist()):
             name = names[i]
             if new[k]:
@@ -252,7 +255,7 @@ class Control:
     gaps: Gaps
     law: SafetyLaw
     hears: BoolArray
-    following: FollowingLaw = FollowingLaw()
+    following: FollowingLaw = FOLLOWING
     places: Places = ()
 
     def drive(self, plant: MixedPlant, cap_step: int) -> None:
@@ -281,9 +284,7 @@ class Control:
         most_mps2, may_merge = self._told(now_s, plant.period_s, users, around)
         changes = np.zeros(len(users.number), np.bool_)
         for own in np.flatnonzero(may_merge & on_lane & users.automated).tolist():
-            changes[own] = may_change_lane(
-                users, own, around, self.gaps, self.following, self.law
-            )
+            changes[own] = may_change_lane(users, own, around, self.gaps, self.following, self.law)
         accel_mps2 = driven_mps2(
             users,
             around,

@@ -1,0 +1,115 @@
+"""What automated vehicles and drivers each get of a run in which both are on the road."""
+
+import numpy as np
+import polars as pl
+
+from coramp._kernel import BoolArray, FloatArray
+from coramp.checker.among_drivers import (
+    AMONG_DRIVERS,
+    BY_AUTOMATED,
+    BY_DRIVER,
+    Findings,
+    Limits,
+    Seen,
+    findings_of,
+)
+from coramp.metrics.frames import frame_of
+from coramp.metrics.motion import hard_brakings, stopped_vehicles
+from coramp.mixed.laws import SafetyLaw
+from coramp.records.outcome import Outcome, Pieces
+from coramp.records.schemas import MIXED_METRICS, SAFETY_EVENTS, Row
+from coramp.road.lanes import MAINLINE
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import DriverPopulation
+
+HARD_MPS2 = 3.0
+NEARER = "automated nearer than promised"
+
+
+def mixed_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> Row:
+    """Returns the figures by kind of vehicle, and whose fault collisions were; else null."""
+    automated = outcome.passages.automated
+    if automated is None:
+        return dict.fromkeys(MIXED_METRICS)
+    found = findings_in(outcome, scenario)
+    causes = [collision.cause for collision in found.collisions]
+    return {
+        "automated_vehicles": int(automated.sum()),
+        "automated_delay_s": _mean(delay_s[automated]),
+        "driver_delay_s": _mean(delay_s[~automated]),
+        "automated_hard_brakings_3": _hard_brakings(outcome, automated),
+        "driver_hard_brakings_3": _hard_brakings(outcome, ~automated),
+        "ramp_stops": _ramp_stops(outcome, scenario),
+        "collisions_by_automated": causes.count(BY_AUTOMATED),
+        "collisions_by_driver": causes.count(BY_DRIVER),
+        "collisions_among_drivers": causes.count(AMONG_DRIVERS),
+        "broken_assumptions": len(found.broken),
+        "automated_violations": len(found.unkept),
+    }
+
+
+def findings_in(outcome: Outcome, scenario: Scenario) -> Findings:
+    """Returns what the checker finds in the positions of a run of mixed traffic."""
+    passages, driven = outcome.passages, outcome.driven
+    automated = passages.automated
+    if automated is None:
+        return Findings((), (), ())
+    vehicle = np.repeat(np.arange(len(passages)), np.diff(driven.first))
+    time_s, station_m, speed_mps, _ = driven.rows.T
+    seen = Seen(
+        vehicle,
+        time_s,
+        station_m,
+        speed_mps,
+        outcome.lane == MAINLINE,
+        passages.length_m,
+        automated,
+    )
+    return findings_of(seen, limits_of(scenario.drivers[outcome.drivers]), outcome.collided)
+
+
+def limits_of(drivers: DriverPopulation) -> Limits:
+    """Returns what automated vehicles reckon with among these drivers."""
+    law = SafetyLaw()
+    return Limits(law.braking_mps2, drivers.min_gap_m, max(drivers.taus_s), law.relax_m)
+
+
+def safety_events(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
+    """Returns one row per collision, broken assumption and broken promise of mixed traffic."""
+    found = findings_in(outcome, scenario)
+    events = [(c.time_s, f"collision {c.cause}", c.rear, c.front) for c in found.collisions]
+    events += [(b.time_s, f"driver {b.what}", b.rear, b.front) for b in found.broken]
+    events += [(time_s, NEARER, rear, front) for time_s, rear, front in found.unkept]
+    events.sort()
+    names = outcome.passages.vehicle_id
+    return frame_of(
+        SAFETY_EVENTS,
+        time_s=[event[0] for event in events],
+        event=[event[1] for event in events],
+        rear_vehicle_id=[names[event[2]] for event in events],
+        front_vehicle_id=[names[event[3]] for event in events],
+    )
+
+
+def _mean(values: FloatArray) -> float | None:
+    return float(values.mean()) if len(values) else None
+
+
+def _of(pieces: Pieces, chosen: BoolArray) -> Pieces:
+    """The pieces of the chosen vehicles alone; others have none."""
+    counts = np.diff(pieces.first)
+    rows = pieces.rows[np.repeat(chosen, counts)]
+    first = np.concatenate([[0], np.cumsum(np.where(chosen, counts, 0))]).astype(np.int64)
+    return Pieces(first, np.ascontiguousarray(rows))
+
+
+def _hard_brakings(outcome: Outcome, chosen: BoolArray) -> int:
+    own = _of(outcome.driven, chosen)
+    return int(hard_brakings(own.first, own.rows, outcome.until_s, HARD_MPS2))
+
+
+def _ramp_stops(outcome: Outcome, scenario: Scenario) -> int:
+    passages = outcome.passages
+    own = _of(outcome.driven, passages.on_ramp)
+    end_m = scenario.ramp.acceleration_lane_m
+    return int(stopped_vehicles(own.first, own.rows, outcome.until_s, passages.merge_s, end_m))

@@ -1,0 +1,52 @@
+"""Runs in which automated vehicles drive among drivers: what they may ask for and promise."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from coramp.errors import CorampError
+from coramp.scenarios.model import Scenario
+from coramp.strategies.base import Strategy
+from coramp.strategies.registry import strategies
+from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
+
+
+def coordinates_drivers(strategy: type[Strategy]) -> bool:
+    """Returns whether a strategy can coordinate automated vehicles among drivers."""
+    return hasattr(strategy, "steer")
+
+
+def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, population: str) -> None:
+    """Raises CorampError if a strategy, an engine or drivers cannot be those of mixed traffic."""
+    if engine != "sumo":
+        raise CorampError(
+            f"engine: {engine} has no drivers, and [traffic] leaves some vehicles to them; "
+            "choose sumo, or automated shares of 1"
+        )
+    if strategy.cooperative and not coordinates_drivers(strategy):
+        able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
+        raise CorampError(
+            f"strategy: {strategy.name} cannot plan among drivers, and [traffic] leaves some "
+            f"vehicles to them; allowed are {able}, or automated shares of 1"
+        )
+    integrator = scenario.drivers[population].integrator
+    if scenario.has_automated and integrator != "euler":
+        raise CorampError(
+            f"drivers.{population}.integrator: {integrator} drivers are others than Euler's, and "
+            "automated vehicles among them take Euler steps; allowed is euler"
+        )
+
+
+def _among_drivers(strategy: type[Strategy]) -> bool:
+    return not strategy.cooperative or coordinates_drivers(strategy)
+
+
+def broken_among_drivers(row: Mapping[str, Any]) -> list[str]:
+    """Returns in words what automated vehicles among drivers promised and did not keep."""
+    broken = []
+    if row.get("collisions_by_automated"):
+        broken.append(f"{row['collisions_by_automated']} collisions that automated vehicles caused")
+    if row.get("automated_violations"):
+        broken.append(f"{row['automated_violations']} pairs nearer than automated vehicles promise")
+    if (row.get("plan_error_m") or 0.0) > LARGEST_PLAN_ERROR_M:
+        broken.append(f"driven {row['plan_error_m']:.3f} m off plan")
+    return broken

@@ -1,0 +1,148 @@
+"""SUMO's own drivers on the arrivals of a scenario, metered or not."""
+
+import math
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from coramp.coordination.plant import Arrival
+from coramp.coordination.service import Service
+from coramp.demand.arrivals import arrivals_of, automated_of
+from coramp.messages.events import Report
+from coramp.messages.log import Told
+from coramp.records.outcome import Outcome
+from coramp.scenarios.model import Scenario
+from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
+from coramp.worlds.outcomes import cap_step_of, step_after
+from coramp.worlds.sumo.as_driven import outcome_as_driven
+from coramp.worlds.sumo.demand import Automated, driver_routes
+from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
+from coramp.worlds.sumo.metering import Meter, loops
+from coramp.worlds.sumo.network import driver_road_plan
+from coramp.worlds.sumo.session import Session
+from coramp.worlds.sumo.telling import DriversInSumo, with_answers
+from coramp.worlds.sumo.traits import traits_of
+from coramp.worlds.telling import reports_of_samples
+
+LEAST_TAU_S = 0.1
+"""The least time gap that SUMO's Krauss model keeps free of collisions: one step."""
+LOOK_S = 60.0
+"""How long SUMO runs by itself between two looks at whether it is empty."""
+
+
+def run_uncontrolled(
+    scenario: Scenario,
+    strategy: Decider,
+    population: str,
+    seed: int,
+    options: SumoOptions,
+) -> Outcome:
+    """Returns what happened with SUMO's own drivers on the same arrivals, metered or not.
+
+    They report and are never commanded; the loop is that of cooperative runs.
+    """
+    drivers = scenario.drivers[population]
+    arrivals = arrivals_of(scenario, seed)
+    metered = is_metered(strategy)
+    automated = alone_among_drivers(scenario, arrivals, seed)
+    plan = driver_road_plan(scenario, drivers, metered)
+    step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
+    with tempfile.TemporaryDirectory(prefix="coramp-") as name:
+        ballistic = drivers.integrator == "ballistic"
+        files = RunFiles(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
+        traits = traits_of(drivers, arrivals, seed)
+        files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered, automated))
+        look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
+        if metered:
+            files.write_loops(loops(scenario, look_steps * step_s))
+        with Session(files.options(), step_s, options.gui) as session:
+            road = DriversInSumo(session, plan.lane_starts_m(), step_s)
+            meter = Meter(session, step_s) if metered else None
+            service = Service(
+                strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
+            )
+            _let_drive(session, service, road, meter, look_steps, cap_step)
+        files.keep()
+        samples, finished = files.samples(arrivals), files.finished()
+        collisions, collided = files.collisions(), files.collided(arrivals)
+    outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
+    told = None
+    if options.keep_messages:
+        left = not np.isnan(outcome.passages.exit_s).any()
+        end_step = min(cap_step, step_after(outcome.end_s if left else math.inf, step_s))
+        told = _told_of_drivers(arrivals, samples, road.told, meter, step_s, end_step)
+    passages = outcome.passages
+    if automated is not None:
+        passages = replace(passages, automated=automated.vehicles)
+    return replace(
+        outcome,
+        passages=passages,
+        refusals=tuple(service.coordinator.refusals),
+        interventions=service.coordinator.interventions,
+        told=told,
+        drivers=population,
+        collided=collided,
+    )
+
+
+def alone_among_drivers(
+    scenario: Scenario, arrivals: Sequence[Arrival], seed: int
+) -> Automated | None:
+    """Returns the automated vehicles that nobody coordinates, None where there are none.
+
+    SUMO's Krauss model drives them without imperfection, at the gaps of ``[safety]``.
+    """
+    if not scenario.is_mixed:
+        return None
+    vehicles = automated_of(scenario, arrivals, seed)
+    if not vehicles.any():
+        return None
+    yields = 1.0 if scenario.traffic.automation == "yielding" else 0.0
+    return Automated(
+        vehicles,
+        max(scenario.safety.time_gap_s, LEAST_TAU_S),
+        scenario.safety.standstill_gap_m,
+        f'lcCooperative="{yields!r}"',
+    )
+
+
+def _let_drive(
+    session: Session,
+    service: Service,
+    road: DriversInSumo,
+    meter: Meter | None,
+    look_steps: int,
+    cap_step: int,
+) -> None:
+    """Lets SUMO run until it is empty; tells the service so far each ``look_steps``, and obeys."""
+    step = 0
+    while step < cap_step and (step == 0 or session.vehicles_left()):
+        until = min(cap_step, step + look_steps)
+        readings = [] if meter is None else [meter.read(step, until)]
+        session.step_to(until)
+        road.now_step = step = until
+        commands = service.handle(readings, step)
+        if meter is not None:
+            meter.obey(commands, step)
+
+
+def _told_of_drivers(
+    arrivals: Sequence[Arrival],
+    samples: Samples,
+    answers: Sequence[Report],
+    meter: Meter | None,
+    step_s: float,
+    end_step: int,
+) -> Told:
+    """Returns the messages of a run of drivers, who are reported and never commanded."""
+    number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
+    positions = reports_of_samples(*samples.motion, step_s)
+    positions = with_answers(positions, answers, number, step_s)
+    if meter is None:
+        return Told(arrivals, [], positions, [], end_step)
+    signals = [signal for signal in meter.signals if signal.step <= end_step]
+    readings = [r for r in meter.readings if round(r.time_s / step_s) <= end_step]
+    return Told(arrivals, signals, positions, readings, end_step)
