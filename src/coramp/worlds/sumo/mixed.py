@@ -35,9 +35,11 @@ MORE_FOR_DRIVER_S = 0.3
 """How much more than a driver's own gap room for one who merges has."""
 TRUCK_BRAKING_MPS2 = 5.0
 """What the brakes of a heavy vehicle must do (UN Regulation 13, type 0 test)."""
-STAYS_IN_LANE = 'lcCooperative="1" lcAssertive="0.001"'
-"""It accepts no gap by itself, and SUMO's drivers yield to it as to one another."""
+YIELDED_TO = 'lcCooperative="1"'
+"""SUMO's drivers yield to it as to one another."""
 MERGE_LANE = "merge_0"
+NO_GAP_S = 30.0
+"""With such a time gap SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
 FOLLOWING = FollowingLaw()
 
 
@@ -75,7 +77,7 @@ def automated_types(scenario: Scenario, automated: BoolArray, law: SafetyLaw) ->
         automated,
         max(scenario.safety.time_gap_s, law.reaction_s),
         max(scenario.safety.standstill_gap_m, law.margin_m),
-        STAYS_IN_LANE,
+        YIELDED_TO,
     )
 
 
@@ -104,6 +106,7 @@ def run_mixed(
                 Able.of(scenario, arrivals, automated),
                 steps_of_period(strategy.decision_s, step_s),
                 step_s,
+                types.tau_s,
             )
             hears = automated | connected_of(scenario, arrivals, seed)
             Control(scenario, strategy, gaps_of(scenario, drivers), law, hears).drive(
@@ -155,7 +158,8 @@ class MixedPlant:
     """The vehicles in a SUMO session: where they are, and what automated ones are told.
 
     An automated vehicle's speed is that of its commands: under Euler steps SUMO's own is off by
-    half a step's acceleration. ``largest_error_m`` is how far each was from where it was sent, nan
+    half a step's acceleration. ``tau_s`` is the time gap by which drivers know it, once it is on
+    the mainline. ``largest_error_m`` is how far each was from where it was sent, nan
     for drivers.
     """
 
@@ -164,6 +168,7 @@ class MixedPlant:
     able: Able
     period_steps: int
     step_s: float
+    tau_s: float
     largest_error_m: FloatArray = field(init=False)
     _sent_mps: FloatArray = field(init=False)
     _sent_m: FloatArray = field(init=False)
@@ -229,6 +234,8 @@ class MixedPlant:
             name = names[i]
             if new[k]:
                 self.session.take_over_among_drivers(name)
+                if not users.on_mainline[i]:
+                    self.session.judge_gaps_by(name, NO_GAP_S)
             self.session.drive_evenly(
                 name,
                 float(before_mps[k] - accel[k] * half_s),
@@ -236,6 +243,7 @@ class MixedPlant:
                 self.period_steps,
             )
             if changes[i]:
+                self.session.judge_gaps_by(name, self.tau_s)
                 self.session.change_lane_now(name, 1, self.period_steps)
                 self._changing.add(i_number := int(number[k]))
             elif users.on_mainline[i] and (i_number := int(number[k])) in self._changing:

@@ -107,6 +107,10 @@ class Session:
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
         libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
 
+    def judge_gaps_by(self, vehicle_id: str, tau_s: float) -> None:
+        """Sets the time gap by which SUMO judges gaps of a vehicle, its own and behind others."""
+        libsumo.vehicle.setTau(vehicle_id, tau_s)
+
     def drive_evenly(
         self, vehicle_id: str, before_mps: float, after_mps: float, steps: int
     ) -> None:
