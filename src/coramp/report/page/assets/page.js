@@ -26,6 +26,7 @@ coramp.Show = class {
     this.diagrams.forEach((diagram) => {
       const { x, y } = before?.window ?? {};
       if (before) diagram.show([x[0], Math.min(x[1], diagram.full.x[1])], y);
+      else diagram.showAround(this.replay.time);
     });
   }
 
