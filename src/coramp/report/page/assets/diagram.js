@@ -77,7 +77,7 @@ coramp.Diagram = class {
       height: this.height(),
       legend: { show: false },
       scales: { x: { time: false }, y: { range: (_, low, high) => [low, high] } },
-      axes: [{ ...axis(), label: 'time in the run (s); the upright line is the time of the replay' }, { ...axis(), label: 'station (m)', size: 56 }],
+      axes: [{ ...axis(), label: 'time (s)' }, { ...axis(), label: 'station (m)', size: 56 }],
       series: [{}, { show: true, stroke: 'transparent', points: { show: false } }],
       cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false } },
       hooks: {
