@@ -77,6 +77,8 @@ COOPERATIVE = {
     "slots": Look("slots", VERMILION, "o", "-"),
 }
 METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
+METERED_MARKER = "H"
+"""Of metered drivers, who have the colour of the same drivers without control."""
 
 
 FREE_MARKERS = "h>d1"
@@ -104,7 +106,8 @@ def _metered(strategy: str, drivers: str | None) -> Look | None:
         return known
     of_drivers = UNCONTROLLED.get(drivers)
     colour = known.colour if of_drivers is None else of_drivers.colour
-    return replace(known, label=f"{known.label}, {drivers} drivers", colour=colour)
+    label = f"{known.label}, {drivers} drivers"
+    return replace(known, label=label, colour=colour, marker=METERED_MARKER)
 
 
 def _look_of_another(name: str) -> Look:
