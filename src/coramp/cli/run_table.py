@@ -50,7 +50,8 @@ def run_table(summary: Row, unit: SpeedUnit = MPS) -> Table:
         (named("min_margin_m"), _margin(summary)),
         alike("min_ttc_s", "max_drac_mps2"),
         alike("max_severity", "max_decel_mps2"),
-        alike("hard_brakings_3", "hard_brakings_4_5", "stops"),
+        alike("hard_brakings_3", "hard_brakings_4_5"),
+        alike("stops"),
     ]
     if summary["drivers"] is None:
         lines += [alike("plan_error_m"), alike("interventions")]
