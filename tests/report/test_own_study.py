@@ -2,6 +2,7 @@
 
 import html
 import re
+import tomllib
 
 import numpy as np
 import polars as pl
@@ -14,9 +15,11 @@ from coramp.report.over_time_figure import (
     speeds_over_time_figure,
 )
 from coramp.report.page.study_answer import own_answer
+from coramp.report.page.study_repeat import repeat_command
 from coramp.report.varied_figure import varied
 from coramp.report.writing import report
 from coramp.scenarios.toml_files import builtin_text
+from coramp.studies.definition import Study, load_study
 from coramp.studies.speed_unit import KMH
 from coramp.studies.tables import Table, without_same
 from tests.edges import invoke
@@ -95,6 +98,17 @@ def test_the_files_of_ones_own_are_shown_whole_with_their_names(tmp_path):
     assert "a ramp &lt;of&gt; mine" in report(out).read_text()
     coramp.study(str(tmp_path / "asked.toml"), seeds=1, jobs=1, out=out)
     assert "# another\n" in report(out).read_text()
+
+
+def test_an_engine_that_an_option_chose_is_in_the_command():
+    built_in = load_study("paper")
+    assert repeat_command(built_in, {}, 3) == "coramp study paper --seeds 3"
+    moved = repeat_command(built_in.on_engine("exact"), {}, 3)
+    assert moved == "coramp study paper --seeds 3 --engine exact"
+    own = {"mine.toml": STUDY}
+    study = Study.model_validate(tomllib.loads(STUDY))
+    assert repeat_command(study, own, 2) == "coramp study mine.toml --seeds 2"
+    assert repeat_command(study.on_engine("sumo"), own, 2).endswith("--seeds 2 --engine sumo")
 
 
 @in_browser

@@ -158,8 +158,8 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     keys = _without_effect(runs)
     if keys:
         yield (
-            f"{', '.join(keys)}: for coordinated vehicles only. Drivers drive the same with every "
-            "value; they keep tau_s and min_gap_m of their population."
+            f"{', '.join(map(key_name, keys))}: for coordinated vehicles only. Drivers drive the "
+            "same with every value; they keep the gaps of their population (tau_s, min_gap_m)."
         )
     failed = runs.filter(status="failed").height
     if failed:

@@ -1,6 +1,7 @@
 """How to repeat a study, which of its runs can be watched, and how to watch another."""
 
 import shlex
+import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.page.over_time import setting_of_run
 from coramp.scenarios.toml_files import builtin_names, override_text
-from coramp.studies.definition import Study
+from coramp.studies.definition import Grid, Search, Study, load_study
 from coramp.studies.overrides import overrides_of
 from coramp.studies.setting_words import settings_text
 from coramp.studies.shown import plain, shared_flows
@@ -22,7 +23,27 @@ def repeat_command(study: Study, files: Mapping[str, str], seeds: int) -> str:
     ``files`` are the texts that the study has kept, its own file first. One of which no file is
     kept is taken to lie in NAME.toml.
     """
-    return shlex.join(["coramp", "study", _file_of(study, files), "--seeds", str(seeds)])
+    words = ["coramp", "study", _file_of(study, files), "--seeds", str(seeds)]
+    asked, ran = _engines_in_file(study, files), [part.engine for part in _parts(study)]
+    if asked is not None and asked != ran and len(set(ran)) == 1:
+        words += ["--engine", ran[0]]
+    return shlex.join(words)
+
+
+def _parts(study: Study) -> tuple[Grid | Search, ...]:
+    return *study.runs, *study.searches
+
+
+def _engines_in_file(study: Study, files: Mapping[str, str]) -> list[str] | None:
+    """The engines that the study's file asks for, which an option may have changed."""
+    name = _file_of(study, files)
+    if name in files:
+        own = tomllib.loads(files[name])
+        parts = [*own.get("runs", ()), *own.get("searches", ())]
+        return [part.get("engine", Grid.model_fields["engine"].default) for part in parts]
+    if name in builtin_names("studies"):
+        return [part.engine for part in _parts(load_study(name))]
+    return None
 
 
 def _file_of(study: Study, files: Mapping[str, str]) -> str:
