@@ -1,6 +1,7 @@
 """The paper's road and budget, and random trajectories with a sampler of their own."""
 
 import importlib
+import itertools
 import math
 import pkgutil
 from functools import partial
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import strategies as st
 
 from coramp.kinematics.trajectory import intercept_range_m
-from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget
+from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.vehicles.fleet import Fleet
 from coramp.vehicles.traits import Traits
 
@@ -74,6 +75,21 @@ RULES = Rules(
         create_from_nose=False,
     ),
 )
+
+PARTS = (Road, SafetyBudget, MotionLimits, Control, Traffic)
+FLAGS = sum(hint is bool for part in PARTS for hint in part.__annotations__.values())
+"""How many fields of the rules are true or false."""
+
+
+def rules_of_numbers(flags):
+    """Returns rules with another number in each field, in ascending order; the flags as given."""
+    numbers, flags = itertools.count(1.0), iter(flags)
+    return Rules(
+        *(
+            part(**{name: next(flags if hint is bool else numbers) for name, hint in hints.items()})
+            for part, hints in ((part, part.__annotations__) for part in PARTS)
+        )
+    )
 
 
 def with_safety(**changes):

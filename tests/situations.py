@@ -6,10 +6,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.driven import MAINLINE, driven_pieces
+from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
 from coramp.errors import CorampError
 from coramp.messages.feed import RequestFeed
+from coramp.road.lanes import MAINLINE
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
 

@@ -20,6 +20,7 @@ from coramp.equations.ramp_acceleration import lag_m
 from coramp.errors import CorampError
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.road.rules import Rules, packed, unpacked
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import (
@@ -31,7 +32,7 @@ from coramp.strategies.base import (
     period_of,
     steps_of_period,
 )
-from coramp.strategies.feedback import MAINLINE, RAMP, virtual_platoon
+from coramp.strategies.feedback import virtual_platoon
 from coramp.strategies.registry import strategy_named
 from coramp.vehicles.fleet import Fleet
 from coramp.vehicles.merge_state import is_waiting

@@ -12,7 +12,7 @@ import coramp
 from coramp.audit.audit import as_data, audit
 from coramp.audit.verdicts import CONFIRMED, CONTRADICTED, UNCHECKED
 from coramp.errors import CorampError
-from coramp.messages.reading import _order_of
+from coramp.messages.log_reader import _order_of
 from coramp.strategies.registry import strategies
 from tests.edges import invoke
 

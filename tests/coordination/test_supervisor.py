@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.driven import RAMP
 from coramp.coordination.plant import Arrival
 from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
+from coramp.road.lanes import RAMP
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.base import Decision, DriveWithAcceleration
 from tests.situations import driven, least_margin_m, loop, named, situations

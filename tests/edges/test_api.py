@@ -16,7 +16,7 @@ from coramp.records.schemas import (
     MEASURED,
     RUNS,
     SPEEDS,
-    STREAMS,
+    STREAM_ROWS,
     TRAJECTORIES,
     VEHICLES,
     VIOLATIONS,
@@ -210,7 +210,7 @@ def test_a_run_leaves_files_only_where_it_is_told(tmp_path, monkeypatch):
 def test_a_study_gives_runs_streams_and_tables(small_study):
     result, states = small_study
     assert dict(result.runs.schema) == RUNS
-    assert dict(result.streams.schema) == STREAMS
+    assert dict(result.streams.schema) == STREAM_ROWS
     assert result.runs["seed"].to_list() == [1, 2]
     assert result.failed.is_empty()
     assert result.broken_promises == []

@@ -9,7 +9,9 @@ from coramp import CorampError
 from coramp.demand.arrivals import arrivals_of, kinds_of
 from coramp.runs.running import make_spec
 from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.sections import Vehicle
 from coramp.scenarios.vehicle_checks import slow_merge_warning
+from coramp.scenarios.vehicle_types import BUILT_IN, VehicleType
 from coramp.strategies.registry import strategies
 from tests.edges import assert_refused, built_in, invoke
 
@@ -99,6 +101,13 @@ def test_what_does_not_fit_is_refused_in_one_line(tables, line):
     assert problems(*tables) == [line]
 
 
+@pytest.mark.parametrize("name", [["car"], {"a": 1}, 3])
+def test_a_name_that_is_no_text_is_refused(name):
+    (line,) = problems({"name": name, "share": 1.0})
+    assert line.startswith("vehicle.0.name: ")
+    assert line.endswith("input should be a valid string")
+
+
 def test_a_type_longer_than_the_acceleration_lane_is_refused():
     short = {"ramp.acceleration_lane_m": 35.0}
     found = problems(CAR, {**TRUCK, "length_m": 36.0}, **short)
@@ -182,6 +191,25 @@ def test_the_built_in_truck_is_as_documented():
     assert (kind.fuel, kind.sumo_class) == ("heavy-duty", "trailer")
     heavier = scenario_with(CAR, {**TRUCK, "mass_kg": 44000.0}).vehicle_types[1]
     assert (heavier.mass_kg, heavier.length_m) == (44000.0, 16.5)
+
+
+def test_what_a_type_leaves_out_is_a_cars():
+    kind = VehicleType(name="van")
+    assert {key: getattr(kind, key) for key in BUILT_IN["car"]} == BUILT_IN["car"]
+    assert (kind.length_m, kind.mass_kg) == (5.0, 1500.0)
+    assert (kind.fuel, kind.sumo_class) == ("passenger-car", "passenger")
+    assert VehicleType(name="car").model_dump() == kind.model_dump() | {"name": "car"}
+    assert Vehicle().length_m == kind.length_m
+
+
+def test_a_type_is_found_by_its_name_and_an_unknown_one_is_refused():
+    scenario = scenario_with(CAR, TRUCK)
+    assert [scenario.type_named(name).name for name in ("car", "truck", None)] == [
+        *("car", "truck"),
+        "car",
+    ]
+    with pytest.raises(CorampError, match="vehicle type 'bus' is not known; allowed is car, truck"):
+        scenario.type_named("bus")
 
 
 def test_a_type_that_differs_in_size_alone_needs_no_planners_of_its_own():

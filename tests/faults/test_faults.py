@@ -2,10 +2,16 @@
 
 import pytest
 
-from tests.faults.catching import catch, usual_refusals
+from tests.faults.catching import SOURCE, catch, usual_refusals
 from tests.faults.faults import FAULTS
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=BY_NAME)
+def test_what_a_fault_changes_stands_there_once(fault):
+    for edit in fault.edits:
+        assert (SOURCE / "coramp" / edit.path).read_text().count(edit.before) == 1, edit
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from coramp.kinematics.fuel import (
+    FUEL_MODELS,
     HEAVY_DUTY,
     PASSENGER_CAR,
     heavy_duty_piece_fuel_l,
@@ -100,3 +101,12 @@ def test_a_car_burns_by_eq_48_whatever_its_mass():
     usual_l = trajectory_fuel_l(way, 0.0, 10.0)
     assert trajectory_fuel_l(way, 0.0, 10.0, PASSENGER_CAR, 40000.0) == usual_l
     assert trajectory_fuel_l(way, 0.0, 10.0, HEAVY_DUTY, 40000.0) > 5.0 * usual_l
+
+
+def test_each_model_has_its_name_and_any_other_is_refused():
+    assert FUEL_MODELS[PASSENGER_CAR] == "passenger-car"
+    assert FUEL_MODELS[HEAVY_DUTY] == "heavy-duty"
+    way = pieces(0.0, 0.0, 16.0, [(20.0, 2.0)])
+    for model in (-1, len(FUEL_MODELS)):
+        with pytest.raises(ValueError, match="no such model of fuel"):
+            trajectory_fuel_l(way, 0.0, 10.0, model, 40000.0)

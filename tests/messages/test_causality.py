@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp.audit.replay import replayed
-from coramp.messages.reading import PLACES, read_log
+from coramp.messages.kinds import place_of_each
+from coramp.messages.log_reader import read_log
 from coramp.strategies.registry import strategies, strategy_named
 from tests.messages.test_service import listed
 
@@ -52,8 +53,7 @@ def altered(frame, row, how):
         moved = frame.filter((pl.col("vehicle_id").ne_missing(vehicle)) | asks)
         here = (pl.col("vehicle_id") == vehicle) & asks
         moved = moved.with_columns(time_s=pl.when(here).then(step * STEP_S).otherwise("time_s"))
-        rank = pl.col("kind").replace_strict(PLACES, return_dtype=pl.Int64)
-        return moved.sort("time_s", rank, maintain_order=True)
+        return moved.sort("time_s", place_of_each(), maintain_order=True)
     return frame.with_columns(pl.when(here).then(pl.col(how) * 1.05).otherwise(how).alias(how))
 
 

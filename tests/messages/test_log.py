@@ -7,8 +7,10 @@ import pytest
 from coramp.errors import CorampError
 from coramp.messages.commands import Enter, Follow, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
-from coramp.messages.log import LOG_VERSION, MESSAGES, NO_POSITIONS, Positions, Told, as_frame
-from coramp.messages.reading import read_log
+from coramp.messages.kinds import KINDS, LOG_VERSION, MESSAGES
+from coramp.messages.log import NO_POSITIONS, Positions, Told, _row, as_frame
+from coramp.messages.log_reader import read_log
+from coramp.vehicles.traits import Traits
 
 STEP_S = 0.1
 CRUISE = np.array([[0.5, -1000.0, 20.0, 0.0]])
@@ -33,10 +35,21 @@ def log_frame():
     return as_frame(Told(REQUESTS, COMMANDS, REPORTS, (), 20), STEP_S)
 
 
+def every_kind():
+    """A log with a message of each kind, a truck's request and a report with an acceleration."""
+    truck = RequestToEnter("t1", False, 8, 20.0, 16.5, "truck", Traits(16.5, 0.02, 3e-9, 1.0, 25.0))
+    positions = Positions._make(np.concatenate([column, column]) for column in REPORTS)
+    accel_mps2, comparison = np.array([np.nan, np.nan, 1.5, -1.5]), np.arange(4) == 3
+    positions = positions._replace(accel_mps2=accel_mps2, comparison=comparison)
+    reading = DetectorReading(1.0, 0.25, 0.5, 2)
+    commands = [*COMMANDS, SetSignal(10, True)]
+    return as_frame(Told([*REQUESTS, truck], commands, positions, [reading], 20), STEP_S)
+
+
 def read(frame, folder):
     path = folder / "messages.parquet"
     frame.write_parquet(path)
-    return read_log(path, STEP_S, {"m1", "r1", "r2"})
+    return read_log(path, STEP_S, {"m1", "r1", "r2", "t1"})
 
 
 def refusal(frame, folder):
@@ -76,6 +89,53 @@ def test_everything_stands_in_the_order_in_which_it_was_told():
         (1.0, "report", "r1"),
         (2.0, "end", None),
     ]
+
+
+def test_the_kinds_of_version_2():
+    """Whoever changes these raises ``LOG_VERSION``."""
+    position = {"vehicle_id", "of_s", "station_m", "speed_mps", "std_m"}
+    trajectory = {"vehicle_id"} | {
+        f"piece_{name}" for name in ("time_s", "station_m", "speed_mps", "accel_mps2")
+    }
+    expected = {
+        "report": (0, position),
+        "comparison": (4, position),
+        "reading": (1, {"mainline_occupancy", "queue_occupancy", "passed_veh"}),
+        "request": (2, {"vehicle_id", "stream", "speed_mps", "length_m", "vehicle_type"}),
+        "entry": (3, trajectory),
+        "command": (3, trajectory),
+        "acknowledgement": (3, {"vehicle_id", "of_s"}),
+        "signal": (3, {"green"}),
+        "end": (5, set()),
+    }
+    assert LOG_VERSION == 2
+    assert {name: (kind.place, set(kind.needs)) for name, kind in KINDS.items()} == expected
+
+
+def test_each_message_has_the_columns_of_its_kind():
+    frame, seen = every_kind(), set()
+    for row in frame.iter_rows(named=True):
+        has = {name for name, value in row.items() if value is not None}
+        assert KINDS[row["kind"]].fits(has - {"version", "time_s", "kind"}), row
+        seen.add(row["kind"])
+    assert seen == set(KINDS)
+
+
+def test_a_message_with_other_columns_is_not_written():
+    with pytest.raises(ValueError, match="signal: has"):
+        _row("signal", 0.0, green=True, speed_mps=1.0)
+    with pytest.raises(ValueError, match="signal: has"):
+        _row("signal", 0.0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_what_any_kind_needs_is_asked_for(name, tmp_path):
+    for column in KINDS[name].needs:
+        frame = every_kind()
+        row = frame["kind"].to_list().index(name)
+        line = refusal(changed(frame, row, **{column: None}), tmp_path)
+        assert line.startswith(f"row {row} ")
+        assert line.endswith(f"{name}): has no {column}; allowed is a value")
 
 
 def test_what_is_read_is_what_was_told(tmp_path):

@@ -8,8 +8,8 @@ from coramp.coordination.service import Service
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
-from coramp.messages.commands import Enter
-from coramp.messages.events import Report, RequestToEnter
+from coramp.messages.commands import Enter, SetSignal
+from coramp.messages.events import Acknowledgement, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategies, strategy_named
@@ -97,6 +97,22 @@ def test_time_does_not_go_back():
     live.handle([], 4)
     with pytest.raises(CorampError, match="step 4 has been handled"):
         live.handle([], 4)
+
+
+@pytest.mark.parametrize("stranger", [{"vehicle_id": "m1"}, SetSignal(0, True)])
+def test_what_is_no_event_is_refused_by_its_kind(stranger):
+    known = "RequestToEnter, Report, Acknowledgement, DetectorReading"
+    line = f"{type(stranger).__name__} is no event; allowed are {known}"
+    with pytest.raises(CorampError, match=f"^{line}$"):
+        service().handle([stranger], 0)
+
+
+def test_reports_and_acknowledgements_of_who_asked_change_nothing():
+    request = RequestToEnter("m1", False, 3, 18.0, 5.0)
+    live = service()
+    entered = live.handle([request], 3)
+    told = [Report("m1", 0.4, -990.0, 18.0), Acknowledgement("m1", 0.4, 0.3)]
+    assert (len(entered), live.handle(told, 4)) == (1, ())
 
 
 @pytest.mark.parametrize("speed_mps", [float("nan"), float("inf"), 0.0])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.records.lanes import planned_history, seen_history
 from coramp.records.outcome import Outcome, Passages, Pieces
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.scenarios.loading import load_scenario
 
 PAPER = load_scenario("paper")

@@ -7,8 +7,10 @@ import polars as pl
 import pytest
 from scipy.integrate import solve_ivp
 
+from coramp.errors import CorampError
+from coramp.kinematics.fuel import HEAVY_DUTY, PASSENGER_CAR
 from coramp.metrics.tables import tables_of
-from coramp.metrics.types import own_free_flow_s, type_figures
+from coramp.metrics.types import fuel_models_of, own_free_flow_s, type_figures
 from coramp.records.schemas import TYPES
 from coramp.road.rules import packed
 from coramp.scenarios.loading import load_scenario
@@ -77,6 +79,24 @@ def test_delay_counts_against_ones_own_free_flow_and_fuel_by_ones_own_model():
     assert table["top_speed_mps"].to_list() == [None, 16.0, None]
     assert table["mass_kg"].to_list() == [1500.0, 40000.0, 1500.0]
     assert table["length_m"].to_list() == [5.0, 16.5, 5.0]
+
+
+def test_vehicles_without_a_type_are_cars():
+    cars = (Car("m00001", exit_s=1.0), Car("m00002", exit_s=1.0))
+    outcome = outcome_of(cars, end_s=2.0)
+    assert outcome.passages.types() == ("car", "car")
+    assert tables_of(outcome, load_scenario("paper")).vehicles["vehicle_type"].to_list() == [
+        *("car", "car")
+    ]
+    assert fuel_models_of(outcome.passages, MIXED).tolist() == [PASSENGER_CAR] * 2
+
+
+def test_a_type_that_the_scenario_does_not_have_gets_nobodys_fuel():
+    passages = mixed_outcome().passages
+    assert fuel_models_of(passages, MIXED).tolist() == [PASSENGER_CAR, HEAVY_DUTY, PASSENGER_CAR]
+    object.__setattr__(passages, "vehicle_type", ("car", "lorry", "car"))
+    with pytest.raises(CorampError, match="vehicle type 'lorry' is not known"):
+        fuel_models_of(passages, MIXED)
 
 
 def test_figures_by_type_and_stream():

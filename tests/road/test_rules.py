@@ -1,18 +1,18 @@
 """Rules as one array and back."""
 
+import itertools
+
 import numpy as np
+import pytest
 
-from coramp.road.rules import Control, Rules, Traffic, packed, unpacked
-from tests.mathematics import RULES
+from coramp.road.rules import Rules, packed, unpacked
+from tests.mathematics import FLAGS, RULES, rules_of_numbers
 
 
-def test_packing_and_unpacking_gives_the_same_rules():
-    for control in (
-        Control(0.1, 0.2, 0.5, gap_at_front=True, create_from_nose=False),
-        Control(0.1, 0.2, 0.5, gap_at_front=False, create_from_nose=True),
-    ):
-        rules = RULES._replace(control=control, traffic=Traffic(True, 12.5))
-        assert unpacked(packed(rules)) == rules
+@pytest.mark.parametrize("flags", list(itertools.product((False, True), repeat=FLAGS)))
+def test_rules_come_back_with_every_field_in_its_place(flags):
+    rules = rules_of_numbers(flags)
+    assert unpacked(packed(rules)) == rules
 
 
 def test_every_number_has_a_place_of_its_own():

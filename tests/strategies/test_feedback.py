@@ -8,15 +8,10 @@ from hypothesis import strategies as st
 from coramp.checker.record import empty_record
 from coramp.coordination.commitments import commit_entry
 from coramp.coordination.ledger import Ledger
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.road.rules import packed
 from coramp.scenarios.loading import load_scenario
-from coramp.strategies.feedback import (
-    MAINLINE,
-    RAMP,
-    Platoon,
-    place_on_mainline,
-    virtual_platoon,
-)
+from coramp.strategies.feedback import Platoon, place_on_mainline, virtual_platoon
 from coramp.strategies.ocbf import Ocbf
 from coramp.strategies.virtual_platoon import VirtualPlatoon
 from tests.mathematics import sized

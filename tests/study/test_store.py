@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from coramp import CorampError
-from coramp.records.schemas import RUNS, STREAMS
+from coramp.records.schemas import RUNS, STREAM_ROWS
 from coramp.runs.running import make_spec
 from coramp.studies.definition import load_study
 from coramp.studies.store import Part, Store
@@ -21,7 +21,7 @@ OTHER = make_spec("paper", seed=2)
 def part_of(spec, **figures):
     run = run_row(**figures) | spec.keys | {"run_id": spec.run_id}
     streams = [
-        {"run_id": spec.run_id, **dict.fromkeys(list(STREAMS)[1:]), "stream": stream}
+        {"run_id": spec.run_id, **dict.fromkeys(list(STREAM_ROWS)[1:]), "stream": stream}
         for stream in ("mainline", "ramp")
     ]
     return Part(run, streams)
@@ -118,7 +118,7 @@ def test_tables_keep_types_and_the_order_of_parts(store):
     parts = [part_of(OTHER, rung_free=3), part_of(SPEC, mainline_delay_s=0.5)]
     runs, streams = store.frames(parts)
     assert dict(runs.schema) == RUNS
-    assert dict(streams.schema) == STREAMS
+    assert dict(streams.schema) == STREAM_ROWS
     assert runs["run_id"].to_list() == [OTHER.run_id, SPEC.run_id]
     assert streams["run_id"].to_list() == [OTHER.run_id] * 2 + [SPEC.run_id] * 2
     store.write_tables(runs, streams, "# Study\n")
@@ -130,7 +130,7 @@ def test_tables_keep_types_and_the_order_of_parts(store):
 def test_no_parts_are_empty_tables_with_all_columns(store):
     runs, streams = store.frames([])
     assert (dict(runs.schema), runs.height) == (RUNS, 0)
-    assert (dict(streams.schema), streams.height) == (STREAMS, 0)
+    assert (dict(streams.schema), streams.height) == (STREAM_ROWS, 0)
 
 
 def test_the_same_study_opens_its_folder_again(tmp_path, store, study):

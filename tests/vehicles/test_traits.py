@@ -18,7 +18,7 @@ from coramp.vehicles.traits import (
     standing_behind_m,
     traits_or_usual,
 )
-from tests.mathematics import RULES, SAFETY, close, sized, truck
+from tests.mathematics import FLAGS, RULES, SAFETY, close, rules_of_numbers, sized, truck
 
 RULES_27 = RULES._replace(road=RULES.road._replace(mainline_speed_mps=27.0))
 
@@ -36,6 +36,17 @@ def test_nothing_but_the_common_limits_binds_a_car():
     assert cruise_mps(sized(), RULES_27) == 27.0
     assert own_rules(sized(), RULES_27, True) == RULES_27
     assert own_rules(sized(), RULES_27, False) == RULES_27
+
+
+@pytest.mark.parametrize("flag", [False, True])
+def test_own_rules_keep_every_field_that_a_vehicle_does_not_lower(flag):
+    rules = rules_of_numbers([flag] * FLAGS)
+    silent = np.full(len(Traits._fields), math.nan)
+    kept = rules._replace(
+        safety=rules.safety._replace(follower_clock_extra_s=0.0),  # of a pair, not of a vehicle
+        motion=rules.motion._replace(slowest_ramp_speed_mps=rules.road.ramp_speed_mps),
+    )
+    assert own_rules(traits_or_usual(silent, rules), rules, True) == kept
 
 
 def test_a_vehicle_cruises_at_v0_or_at_its_own_top_speed():

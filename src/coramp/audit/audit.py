@@ -33,8 +33,8 @@ from coramp.audit.positions import steps_from
 from coramp.audit.verdicts import Audit, Check, Finding, finding, judged, unchecked
 from coramp.coordination.examination import bounds_of
 from coramp.errors import CorampError
-from coramp.messages.log import COMPARISON, REPORT
-from coramp.messages.reading import OutOfOrderError
+from coramp.messages.kinds import COMPARISON, REPORT
+from coramp.messages.log_reader import OutOfOrderError
 from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 

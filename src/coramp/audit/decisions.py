@@ -11,7 +11,7 @@ from coramp.audit.verdicts import UNCHECKED, Check, Finding, finding, judged
 from coramp.coordination.guard import strategy_to_run
 from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
-from coramp.messages.log import ACKNOWLEDGEMENT, READING, SIGNAL
+from coramp.messages.kinds import ACKNOWLEDGEMENT, READING, SIGNAL
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.frames import decisions_table
 from coramp.strategies.base import period_of, steps_of_period

@@ -10,8 +10,9 @@ from coramp.audit.orders import Motion, motion_of
 from coramp.audit.positions import due_reports, expected_in_sumo, off_the_order
 from coramp.audit.verdicts import Check, Finding, finding, judged
 from coramp.coordination.examination import bounds_of
-from coramp.messages.log import COMPARISON, REPORT, report_steps
-from coramp.messages.reading import MessageLog
+from coramp.messages.kinds import COMPARISON, REPORT
+from coramp.messages.log import report_steps
+from coramp.messages.log_reader import MessageLog
 
 COMMITMENT = "a commitment"
 PLAN_ERROR_M = 0.05

@@ -14,7 +14,7 @@ from coramp.audit.neighbours import (
     MERGE_REAR,
     SEVERITY,
     TTC,
-    VIOLATIONS,
+    VIOLATION_COUNT,
     Stays,
     extremes_in_lane,
 )
@@ -68,7 +68,7 @@ def derive(
     margin_m, equation = _least_margin(float(least[MARGIN]), merges)
     figures = {
         "unserved": float(np.isnan(passages.exit_s).sum()),
-        "safety_violations": float(sum(lane.extremes[VIOLATIONS] for lane in lanes)),
+        "safety_violations": float(sum(lane.extremes[VIOLATION_COUNT] for lane in lanes)),
         "min_margin_m": _finite(margin_m),
         "min_margin_equation": equation,
         "min_merge_margin_m": _finite(min(merges.values())),

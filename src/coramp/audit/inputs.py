@@ -9,9 +9,9 @@ import numpy as np
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
 from coramp.checker.merging import NOT_COMMANDED, ON_IT_AT_ENTRY
-from coramp.messages.commands import Command, Enter, SetSignal
-from coramp.messages.log import COMMAND, ENTRY, TRAIT_COLUMNS
-from coramp.messages.reading import MessageLog, read_log
+from coramp.messages.commands import Enter, SetSignal, WorldCommand
+from coramp.messages.kinds import COMMAND, ENTRY, TRAIT_COLUMNS
+from coramp.messages.log_reader import MessageLog, read_log
 from coramp.records.run import MESSAGES, RunRecords
 from coramp.records.run_folder import read_run
 from coramp.road.streams import STREAMS
@@ -91,7 +91,9 @@ def _orders(log: MessageLog, askers: Askers, rows: IntArray) -> Orders:
     )
 
 
-def orders_of(commands: Sequence[Command], numbers: Mapping[str, int], step_s: float) -> Orders:
+def orders_of(
+    commands: Sequence[WorldCommand], numbers: Mapping[str, int], step_s: float
+) -> Orders:
     """Returns trajectories that were commanded just now, as orders."""
     told = [command for command in commands if not isinstance(command, SetSignal)]
     counts = [len(command.pieces) for command in told]

@@ -22,7 +22,7 @@ from coramp.checker.distances import (
     needs_of,
 )
 
-MARGIN, MERGE_FRONT, MERGE_REAR, TTC, DRAC, SEVERITY, GAP, VIOLATIONS = range(8)
+MARGIN, MERGE_FRONT, MERGE_REAR, TTC, DRAC, SEVERITY, GAP, VIOLATION_COUNT = range(8)
 """Places among the extremes of a lane: margins (m) over Eq. 1, 15 and 16, TTC (s), DRAC (m/s2),
 severity (m2/s4), gap (m), and how many violations."""
 ROUNDING_M = 1e-8
@@ -66,7 +66,7 @@ def extremes_in_lane(motion: Motion, traits: FloatArray, stays: Stays, bounds: B
     _pass_through(
         motion, traits, stays, times_s[order], comes[order], stay[order], bounds, extremes, noted
     )
-    return Pairs(extremes, noted[: int(extremes[VIOLATIONS])])
+    return Pairs(extremes, noted[: int(extremes[VIOLATION_COUNT])])
 
 
 class _Lane(NamedTuple):
@@ -155,10 +155,10 @@ def _state(motion: Motion, vehicle: int, time_s: float) -> tuple[float, float]:
 def _note(
     extremes: FloatArray, noted: FloatArray, time_s: float, front: int, rear: int, margin_m: float
 ) -> None:
-    k = int(extremes[VIOLATIONS])
+    k = int(extremes[VIOLATION_COUNT])
     if k < len(noted):
         noted[k, 0], noted[k, 1], noted[k, 2], noted[k, 3] = time_s, front, rear, margin_m
-    extremes[VIOLATIONS] += 1.0
+    extremes[VIOLATION_COUNT] += 1.0
 
 
 @kernel

@@ -7,11 +7,11 @@ import numpy as np
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.service import Service
 from coramp.messages.channel import Channel
-from coramp.messages.commands import Command, SetSignal
+from coramp.messages.commands import SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
-from coramp.messages.log import KINDS, READING, REPORT, TRAIT_COLUMNS
-from coramp.messages.reading import MessageLog
+from coramp.messages.kinds import CODES, READING, REPORT, TRAIT_COLUMNS
+from coramp.messages.log_reader import MessageLog
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider
@@ -21,7 +21,7 @@ from coramp.vehicles.traits import Traits
 class Replayed(NamedTuple):
     """What a fresh coordinator commanded, and the coordinator."""
 
-    commands: list[Command]
+    commands: list[WorldCommand]
     coordinator: Coordinator
 
 
@@ -97,6 +97,6 @@ def replayed_signals(log: MessageLog, scenario: Scenario, strategy: Decider) -> 
 
 def reports_at(log: MessageLog, step: int) -> list[Report]:
     """Returns the reports of a step, in the order of the log."""
-    rows = np.flatnonzero((log.step == step) & (log.kind == KINDS.index(REPORT)))
+    rows = np.flatnonzero((log.step == step) & (log.kind == CODES[REPORT]))
     told = log.frame[rows].select("vehicle_id", "time_s", "station_m", "speed_mps")
     return [Report(*row) for row in told.iter_rows()]

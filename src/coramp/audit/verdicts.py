@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from coramp.messages.reading import MessageLog
+from coramp.messages.log_reader import MessageLog
 
 CONFIRMED, CONTRADICTED, UNCHECKED = "confirmed", "contradicted", "not checked"
 MOST_TOLD = 5

@@ -14,10 +14,9 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_to_cover,
 )
+from coramp.road.lanes import ACCELERATION_LANE, MAINLINE, RAMP
 from coramp.vehicles.merge_state import NOT_PLANNED_S
 
-RAMP, ACCELERATION, MAINLINE = 0, 1, 2
-"""Codes of the lanes that pieces lie on."""
 SLIVER_S = 1e-9
 """Pieces that rounding leaves shorter than this are left out."""
 
@@ -25,7 +24,7 @@ SLIVER_S = 1e-9
 def driven_pieces(
     ledger: Ledger, vehicle_of_row: IntArray, vehicles: int, end_s: float
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Returns first rows (one a vehicle and one more), lane codes and pieces, up to ``end_s``.
+    """Returns first rows (one a vehicle and one more), codes of lanes and pieces, up to ``end_s``.
 
     Each commitment counts until the next one of its vehicle takes over, the last one until the
     vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose and at the merge.
@@ -96,7 +95,7 @@ def _cut(
         code = RAMP
         end_s = min(end_s, start_s + time_to_cover(-station_m, speed_mps, pieces[k, ACCEL]))
     else:
-        code = ACCELERATION
+        code = ACCELERATION_LANE
         end_s = min(end_s, merge_s)
     rows[n, TIME], rows[n, STATION] = start_s, station_m
     rows[n, SPEED], rows[n, ACCEL] = speed_mps, pieces[k, ACCEL]

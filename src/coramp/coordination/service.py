@@ -1,13 +1,14 @@
 """A coordinator that is told of events as they happen: ``handle(events, step) -> commands``."""
 
 from collections.abc import Callable, Iterable
+from typing import get_args
 
 from coramp.coordination.coordinator import Coordinator
 from coramp.coordination.drivers import DriverRoad
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
-from coramp.messages.commands import Command
-from coramp.messages.events import DetectorReading, Event, Report, RequestToEnter
+from coramp.messages.commands import WorldCommand
+from coramp.messages.events import Acknowledgement, DetectorReading, Event, Report, RequestToEnter
 from coramp.messages.feed import RequestFeed
 from coramp.road.rules import Rules
 from coramp.strategies.base import Decider, is_metered
@@ -39,12 +40,12 @@ class Service:
         )
         self.coordinator.expect_arrivals()
 
-    def handle(self, events: Iterable[Event], step: int) -> tuple[Command, ...]:
+    def handle(self, events: Iterable[Event], step: int) -> tuple[WorldCommand, ...]:
         """Returns what is commanded up to and including ``step``, the events being those by then.
 
         A reading of the road's loops has the strategy asked at its step. Raises CorampError for a
-        step that has been handled, and for a request or reading of such a step or of one that is
-        yet to come.
+        step that has been handled, for a request or reading of such a step or of one that is yet to
+        come, and for what is no event.
         """
         if step <= self._step:
             raise CorampError(f"step {step} has been handled; allowed is {self._step + 1} or later")
@@ -57,6 +58,11 @@ class Service:
             elif isinstance(event, DetectorReading):
                 self._check_time("the road's loops: tell", round(event.time_s / self._step_s), step)
                 readings.append(event)
+            elif not isinstance(event, Report | Acknowledgement):
+                raise CorampError(
+                    f"{type(event).__name__} is no event; allowed are "
+                    f"{', '.join(kind.__name__ for kind in get_args(Event))}"
+                )
         self._step = step
         for reading in readings:
             self.coordinator.read(reading)

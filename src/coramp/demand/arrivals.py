@@ -117,7 +117,7 @@ IN_ORDER = itemgetter(0, 1, 2, 3)
 def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
     found = []
     for arrival in scenario.arrivals:
-        kind = scenario.type_named(arrival.type or "")
+        kind = scenario.type_named(arrival.type)
         top_mps = arrival.top_speed_mps or 0.5 * sum(kind.top_speeds_mps)
         step = round(arrival.time_s / scenario.control.step_s)
         rest = _rest(scenario, kind, arrival.speed_mps, top_mps, arrival.length_m)

@@ -5,12 +5,15 @@ Eq. 48 itself prints 0.1596 and -7.145e-4, misprints of Table 3's 0.1569 and -7.
 """
 
 import math
+from typing import Literal, get_args
 
 from coramp._kernel import FloatArray, kernel
 from coramp.kinematics.trajectory import ACCEL, SPEED, TIME, piece_end_s
 
-FUEL_MODELS = ("passenger-car", "heavy-duty")
-PASSENGER_CAR, HEAVY_DUTY = range(2)
+FuelModel = Literal["passenger-car", "heavy-duty"]
+"""Names of the models: Eq. 48, and a Willans line for trucks."""
+FUEL_MODELS: tuple[FuelModel, ...] = get_args(FuelModel)
+PASSENGER_CAR, HEAVY_DUTY = range(len(FUEL_MODELS))
 ROLLING, GRAVITY_MPS2 = 0.006, 9.8
 AIR_KG_PER_M = 0.5 * 1.2 * 5.2
 """Half of air density (kg/m3) times drag area c_w A (m2) of an articulated truck."""
@@ -89,7 +92,7 @@ def trajectory_fuel_l(
 ) -> float:
     """Returns the fuel (l) of a trajectory between two times, exactly; 0 if ``to_s <= from_s``.
 
-    ``model`` is a place in ``FUEL_MODELS``; the mass counts for trucks alone.
+    ``model`` is a place in ``FUEL_MODELS``, else ValueError; the mass counts for trucks alone.
     """
     total_l = 0.0
     for k in range(len(pieces)):
@@ -100,6 +103,8 @@ def trajectory_fuel_l(
             if model == HEAVY_DUTY:
                 accel_mps2 = pieces[k, ACCEL]
                 total_l += heavy_duty_piece_fuel_l(mass_kg, speed_mps, accel_mps2, duration_s)
-            else:
+            elif model == PASSENGER_CAR:
                 total_l += piece_fuel_l(speed_mps, pieces[k, ACCEL], duration_s)
+            else:
+                raise ValueError("there is no such model of fuel")
     return total_l

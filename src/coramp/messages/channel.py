@@ -7,7 +7,7 @@ calls the world itself. What vehicles tell does not pass through it.
 from typing import Protocol
 
 from coramp._kernel import FloatArray
-from coramp.messages.commands import Command, Enter, Follow
+from coramp.messages.commands import Enter, Follow, WorldCommand
 from coramp.messages.events import RequestToEnter
 
 
@@ -34,7 +34,7 @@ class Channel:
     """
 
     def __init__(self, world: Plant | None = None) -> None:
-        self.commands: list[Command] = []
+        self.commands: list[WorldCommand] = []
         self._world = world
         self._names: list[str] = []
         self._entering = -1
@@ -61,7 +61,7 @@ class Channel:
         if self._world is not None:
             self._world.follow(row, pieces, merge_time_s)
 
-    def taken(self) -> tuple[Command, ...]:
+    def taken(self) -> tuple[WorldCommand, ...]:
         """Returns what has been commanded since this was last asked."""
         commands, self.commands = tuple(self.commands), []
         return commands

@@ -36,4 +36,4 @@ class SetSignal:
     green: bool
 
 
-Command = Enter | Follow | SetSignal
+WorldCommand = Enter | Follow | SetSignal

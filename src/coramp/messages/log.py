@@ -1,6 +1,7 @@
-"""The log of messages of a run: its columns, how it is written, and how it is read back.
+"""All that was told in a run, and how it is written as a log of messages.
 
-One row a message, in the order in which they were told. Row 0 is the first.
+One row a message, in the order in which they were told. Row 0 is the first. ``messages.kinds`` has
+the kinds and their columns, ``messages.log_reader`` reads a log back.
 """
 
 from collections.abc import Sequence
@@ -10,53 +11,28 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.messages.commands import Command, Enter, SetSignal
+from coramp.messages.commands import Enter, SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, RequestToEnter
+from coramp.messages.kinds import (
+    ACKNOWLEDGEMENT,
+    COMMAND,
+    COMPARISON,
+    END,
+    ENTRY,
+    KINDS,
+    LOG_VERSION,
+    MESSAGES,
+    PIECES,
+    READING,
+    REPORT,
+    REQUEST,
+    SIGNAL,
+    name_in_order,
+    place_of_each,
+)
 from coramp.road.streams import STREAMS
 from coramp.vehicles.merge_state import is_planned
-from coramp.vehicles.traits import Traits
 
-LOG_VERSION = 2
-"""Raised whenever messages get other columns, or mean something else."""
-TRAIT_COLUMNS = tuple(Traits._fields)
-"""Columns of what a vehicle can do: null where only the common limits bind it."""
-PIECES = ("piece_time_s", "piece_station_m", "piece_speed_mps", "piece_accel_mps2")
-MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
-    "version": pl.Int64,
-    "time_s": pl.Float64,
-    "kind": pl.String,
-    "vehicle_id": pl.String,
-    "of_s": pl.Float64,
-    "stream": pl.String,
-    "station_m": pl.Float64,
-    "speed_mps": pl.Float64,
-    "length_m": pl.Float64,
-    "std_m": pl.Float64,
-    "accel_mps2": pl.Float64,
-    "merge_time_s": pl.Float64,
-    **dict.fromkeys(PIECES, pl.List(pl.Float64)),
-    "mainline_occupancy": pl.Float64,
-    "queue_occupancy": pl.Float64,
-    "passed_veh": pl.Int64,
-    "green": pl.Boolean,
-    "vehicle_type": pl.String,
-    **{name: pl.Float64 for name in TRAIT_COLUMNS if name != "length_m"},
-}
-REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, END = KINDS = (
-    "report",
-    "comparison",
-    "reading",
-    "request",
-    "entry",
-    "command",
-    "acknowledgement",
-    "signal",
-    "end",
-)
-"""Kinds of messages.
-
-A comparison is a position that SUMO was asked for where a vehicle changes lanes or leaves.
-"""
 EVERY_S = 1.0
 """How often each vehicle on the road reports where it is."""
 
@@ -92,7 +68,7 @@ class Told(NamedTuple):
     """All that was told in a run that ended at ``end_step``."""
 
     requests: Sequence[RequestToEnter]
-    commands: Sequence[Command]
+    commands: Sequence[WorldCommand]
     positions: Positions
     readings: Sequence[DetectorReading]
     end_step: int
@@ -104,40 +80,37 @@ def report_steps(step_s: float) -> int:
 
 
 def as_frame(told: Told, step_s: float) -> pl.DataFrame:
-    """Returns the log, by time.
-
-    At one time come reports of once a second, readings, requests, commands, and then what vehicles
-    tell as they obey; positions by vehicle.
-    """
-    obeying = told.positions.comparison | ~np.isnan(told.positions.accel_mps2)
-    parts = [
-        _positions(told, ~obeying, step_s),
-        _rows([_reading(reading) for reading in told.readings]),
-        _rows([_request(r, step_s) for r in told.requests if r.step <= told.end_step]),
-        _rows([row for command in told.commands for row in _command(command, step_s)]),
-        _positions(told, obeying, step_s),
-        _rows([{"kind": END, "time_s": told.end_step * step_s}]),
+    """Returns the log: by time, then by the places of the kinds; positions by vehicle."""
+    requests = [request for request in told.requests if request.step <= told.end_step]
+    rows = [
+        *(_reading(reading) for reading in told.readings),
+        *(_request(request, step_s) for request in requests),
+        *(row for command in told.commands for row in _command(command, step_s)),
+        _row(END, told.end_step * step_s),
     ]
-    return (
-        pl.concat(part.with_columns(order=pl.lit(k)) for k, part in enumerate(parts))
-        .with_columns(who=pl.when(pl.col("kind").is_in([REPORT, COMPARISON])).then("vehicle_id"))
-        .sort("time_s", "order", "who", maintain_order=True)
-        .select(list(MESSAGES))
+    frame = pl.concat([_positions(told, step_s), pl.DataFrame(rows, schema=MESSAGES)])
+    return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64)).sort(
+        "time_s", place_of_each(), name_in_order(), maintain_order=True
     )
 
 
-def _rows(rows: Sequence[dict[str, Any]]) -> pl.DataFrame:
-    frame = pl.DataFrame(rows, schema=MESSAGES)
-    return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64))
+def _row(kind: str, time_s: float, **columns: Any) -> dict[str, Any]:
+    return {"kind": kind, "time_s": time_s, **_checked(kind, columns)}
 
 
-def _positions(told: Told, chosen: BoolArray, step_s: float) -> pl.DataFrame:
-    within = chosen & (told.positions.step <= told.end_step)
+def _checked(kind: str, columns: dict[str, Any]) -> dict[str, Any]:
+    """Returns columns as they are; raises ValueError where this kind has others."""
+    if not KINDS[kind].fits(columns):
+        needs, may_have = KINDS[kind].needs, KINDS[kind].may_have
+        raise ValueError(f"{kind}: has {[*columns]}; needs {needs}, may have {may_have}")
+    return columns
+
+
+def _positions(told: Told, step_s: float) -> pl.DataFrame:
+    within = told.positions.step <= told.end_step
     seen = Positions._make(column[within] for column in told.positions)
     names = np.array([request.vehicle_id for request in told.requests], object)
-    columns: dict[str, Any] = {
-        "time_s": seen.step * step_s,
-        "kind": np.where(seen.comparison, COMPARISON, REPORT).astype(object),
+    position: dict[str, Any] = {
         "vehicle_id": names[seen.vehicle] if len(seen.vehicle) else [],
         "of_s": seen.of_s,
         "station_m": seen.station_m,
@@ -145,35 +118,39 @@ def _positions(told: Told, chosen: BoolArray, step_s: float) -> pl.DataFrame:
         "std_m": np.zeros(len(seen.step)),
         "accel_mps2": seen.accel_mps2,
     }
+    columns = {
+        "time_s": seen.step * step_s,
+        "kind": np.where(seen.comparison, COMPARISON, REPORT).astype(object),
+        **_checked(COMPARISON, _checked(REPORT, position)),
+    }
     schema = {name: MESSAGES[name] for name in columns}
     frame = pl.DataFrame(columns, schema=schema).with_columns(
         pl.col("accel_mps2").fill_nan(None),
         *(pl.lit(None, MESSAGES[name]).alias(name) for name in MESSAGES if name not in schema),
     )
-    return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64)).select(list(MESSAGES))
+    return frame.select(list(MESSAGES))
 
 
 def _reading(reading: DetectorReading) -> dict[str, Any]:
-    return {
-        "kind": READING,
-        "time_s": reading.time_s,
-        "mainline_occupancy": reading.mainline_occupancy,
-        "queue_occupancy": reading.queue_occupancy,
-        "passed_veh": reading.passed_veh,
-    }
+    return _row(
+        READING,
+        reading.time_s,
+        mainline_occupancy=reading.mainline_occupancy,
+        queue_occupancy=reading.queue_occupancy,
+        passed_veh=reading.passed_veh,
+    )
 
 
 def _request(request: RequestToEnter, step_s: float) -> dict[str, Any]:
-    return {
-        "kind": REQUEST,
-        "time_s": request.step * step_s,
-        "vehicle_id": request.vehicle_id,
-        "stream": STREAMS[request.on_ramp],
-        "speed_mps": request.speed_mps,
-        "length_m": request.length_m,
-        "vehicle_type": request.vehicle_type,
-        **_traits(request),
-    }
+    return _row(
+        REQUEST,
+        request.step * step_s,
+        vehicle_id=request.vehicle_id,
+        stream=STREAMS[request.on_ramp],
+        speed_mps=request.speed_mps,
+        vehicle_type=request.vehicle_type,
+        **{"length_m": request.length_m, **_traits(request)},
+    )
 
 
 def _traits(request: RequestToEnter) -> dict[str, Any]:
@@ -184,23 +161,18 @@ def _traits(request: RequestToEnter) -> dict[str, Any]:
     return {name: value for name, value in known if np.isfinite(value)}
 
 
-def _command(command: Command, step_s: float) -> list[dict[str, Any]]:
+def _command(command: WorldCommand, step_s: float) -> list[dict[str, Any]]:
     """Returns the row of a command, and of its acknowledgement where there is one."""
     time_s = command.step * step_s
     if isinstance(command, SetSignal):
-        return [{"kind": SIGNAL, "time_s": time_s, "green": command.green}]
+        return [_row(SIGNAL, time_s, green=command.green)]
     merge_s = command.merge_time_s
-    given = {
-        "kind": ENTRY if isinstance(command, Enter) else COMMAND,
-        "time_s": time_s,
-        "vehicle_id": command.vehicle_id,
-        "merge_time_s": merge_s if is_planned(merge_s) else None,
+    given = _row(
+        ENTRY if isinstance(command, Enter) else COMMAND,
+        time_s,
+        vehicle_id=command.vehicle_id,
+        merge_time_s=merge_s if is_planned(merge_s) else None,
         **dict(zip(PIECES, command.pieces.T.tolist(), strict=True)),
-    }
-    answer = {
-        "kind": ACKNOWLEDGEMENT,
-        "time_s": time_s,
-        "vehicle_id": command.vehicle_id,
-        "of_s": time_s,
-    }
+    )
+    answer = _row(ACKNOWLEDGEMENT, time_s, vehicle_id=command.vehicle_id, of_s=time_s)
     return [given, answer]

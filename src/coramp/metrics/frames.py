@@ -8,8 +8,8 @@ import polars as pl
 
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.decision_log import DecisionRecord
-from coramp.records.outcome import LANES
 from coramp.records.schemas import DECISIONS, TRAJECTORIES, Row, Schema
+from coramp.road.lanes import LANES
 
 
 def frame_of(schema: Schema, **columns: Any) -> pl.DataFrame:

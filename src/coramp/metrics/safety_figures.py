@@ -18,9 +18,9 @@ from coramp.metrics.separations import (
     NOTED,
     SEVERITY,
     TTC,
+    VIOLATION_COUNT,
     lane_extremes,
 )
-from coramp.metrics.separations import VIOLATIONS as COUNT
 from coramp.metrics.types import traits_of
 from coramp.records.outcome import Outcome
 from coramp.records.schemas import VIOLATIONS, Row
@@ -37,7 +37,7 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     margin_m, equation = _least_margin(mainline, ramp)
     return {
         "collisions": outcome.collisions,
-        "safety_violations": int(mainline[COUNT] + ramp[COUNT]),
+        "safety_violations": int(mainline[VIOLATION_COUNT] + ramp[VIOLATION_COUNT]),
         "min_margin_m": _finite(margin_m),
         "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
         "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
@@ -93,7 +93,10 @@ def violations_table(outcome: Outcome, scenario: Scenario, count: int) -> pl.Dat
     """Returns the ``count`` violations of a run, by time; at which the margin was least."""
     lanes = _extremes_of_lanes(outcome, scenario, count)
     noted = np.concatenate(
-        [lane[FIGURES : FIGURES + NOTED * int(lane[COUNT])].reshape(-1, NOTED) for lane in lanes]
+        [
+            lane[FIGURES : FIGURES + NOTED * int(lane[VIOLATION_COUNT])].reshape(-1, NOTED)
+            for lane in lanes
+        ]
     )
     noted = noted[np.argsort(noted[:, 0], kind="stable")]
     names = outcome.passages.vehicle_id

@@ -26,7 +26,7 @@ from coramp.vehicles.traits import LENGTH, MASS
 
 LEAVE, ENTER = 0, 1
 """Kinds of events; at one time vehicles leave before others enter."""
-MARGIN, TTC, DRAC, SEVERITY, VIOLATIONS, MERGE_FRONT, MERGE_REAR = range(7)
+MARGIN, TTC, DRAC, SEVERITY, VIOLATION_COUNT, MERGE_FRONT, MERGE_REAR = range(7)
 EXACT_M = 1e-8
 """What rounding may take from a distance that the checker has measured to 1e-9 m."""
 FIGURES, NOTED = 7, 4
@@ -189,11 +189,11 @@ def _end_pair(
 def _note_violation(
     extremes: FloatArray, time_s: float, front: int, rear: int, margin_m: float
 ) -> None:
-    place = FIGURES + NOTED * int(extremes[VIOLATIONS])
+    place = FIGURES + NOTED * int(extremes[VIOLATION_COUNT])
     if place < len(extremes):
         extremes[place], extremes[place + 1] = time_s, front
         extremes[place + 2], extremes[place + 3] = rear, margin_m
-    extremes[VIOLATIONS] += 1.0
+    extremes[VIOLATION_COUNT] += 1.0
 
 
 @kernel

@@ -200,7 +200,7 @@ def vehicle_columns(outcome: Outcome, scenario: Scenario) -> Columns:
         ),
         "finished": finished,
         "plan_error_m": passages.plan_error_m,
-        "vehicle_type": passages.vehicle_type or ("car",) * len(passages),
+        "vehicle_type": passages.types(),
     }
 
 

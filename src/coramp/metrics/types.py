@@ -31,14 +31,13 @@ def trait_columns(traits: FloatArray) -> dict[str, FloatArray]:
 
 
 def fuel_models_of(passages: Passages, scenario: Scenario) -> IntArray:
-    """Returns the place of each vehicle's model of fuel in ``FUEL_MODELS``."""
-    if len(scenario.vehicle_types) == 1:
-        only = FUEL_MODELS.index(scenario.vehicle_types[0].fuel)
-        return np.full(len(passages), only, np.int64)
-    names = passages.vehicle_type or ("",) * len(passages)
-    of_type = {kind.name: FUEL_MODELS.index(kind.fuel) for kind in scenario.vehicle_types}
-    first = next(iter(of_type.values()))
-    return np.array([of_type.get(name, first) for name in names], np.int64)
+    """Returns the place of each vehicle's model of fuel in ``FUEL_MODELS``.
+
+    Raises CorampError for a type that the scenario does not have.
+    """
+    names = passages.types()
+    of_type = {name: FUEL_MODELS.index(scenario.type_named(name).fuel) for name in set(names)}
+    return np.array([of_type[name] for name in names], np.int64)
 
 
 def free_flow_of_each_s(passages: Passages, traits: FloatArray, scenario: Scenario) -> FloatArray:
@@ -74,7 +73,7 @@ def type_figures(
     passages: Passages, delay_s: FloatArray, fuel_l: FloatArray, finished: BoolArray
 ) -> list[Row]:
     """Returns one row per type of vehicle and stream: how many, their mean delay and their fuel."""
-    kinds = np.array(passages.vehicle_type or ("car",) * len(passages), object)
+    kinds = np.array(passages.types(), object)
     rows = []
     for kind in sorted(set(kinds.tolist())):
         for on_ramp in (False, True):

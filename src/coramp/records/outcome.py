@@ -8,10 +8,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.decision_log import DecisionRecord, Refusal
 from coramp.messages.log import Told
 from coramp.records.lanes import LaneHistory
-from coramp.vehicles.traits import Traits
-
-LANES = ("ramp", "acceleration", "mainline")
-"""Names of the lane codes of ``coordination.driven``."""
+from coramp.vehicles.traits import CAR, Traits
 
 
 @dataclass(frozen=True)
@@ -40,6 +37,10 @@ class Passages:
     def __len__(self) -> int:
         return len(self.vehicle_id)
 
+    def types(self) -> tuple[str, ...]:
+        """Returns the name of each vehicle's type: a car's where types were left out."""
+        return self.vehicle_type or (CAR,) * len(self)
+
 
 @dataclass(frozen=True)
 class Pieces:
@@ -57,11 +58,11 @@ class Pieces:
 class Outcome:
     """Everything that an engine hands to the metrics.
 
-    ``pieces`` are what was planned, with a code for each one's ``lane``, and ``driven`` what the
-    simulator made of it; for its own drivers both are its steps. ``lanes`` is who was on which lane
-    when, as driven. ``end_s`` is when the run ended or was cut off. Decisions name vehicles by rows
-    of the ledger; ``vehicle_of_row`` gives their places in ``passages``. ``told`` are the messages,
-    where they were to be kept.
+    ``pieces`` are what was planned, with each one's ``lane`` (``road.lanes``), and ``driven`` what
+    the simulator made of it; for its own drivers both are its steps. ``lanes`` is who was on which
+    lane when, as driven. ``end_s`` is when the run ended or was cut off. Decisions name vehicles by
+    rows of the ledger; ``vehicle_of_row`` gives their places in ``passages``. ``told`` are the
+    messages, where they were to be kept.
     """
 
     cooperative: bool

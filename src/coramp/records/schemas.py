@@ -203,7 +203,7 @@ PLANNING_TIMES = ("planning_median_s", "planning_p95_s")
 MEASURED = ("wall_s", *PLANNING_TIMES)
 """Columns that hold wall times: all that differs between equal runs."""
 
-STREAMS: Schema = {
+STREAM_ROWS: Schema = {
     "run_id": pl.String,
     "stream": pl.String,
     "flow_veh_h": pl.Float64,

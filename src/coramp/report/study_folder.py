@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from coramp.errors import CorampError
 from coramp.records.files import read_json
 from coramp.records.run_folder import check_version
-from coramp.records.schemas import RESULT_VERSION, RUNS, STREAMS, Row
+from coramp.records.schemas import RESULT_VERSION, RUNS, STREAM_ROWS, Row
 from coramp.records.stored_checks import checked_frame, first_of
 from coramp.studies.definition import Study
 from coramp.studies.store import MARK, Store
@@ -110,7 +110,7 @@ def stored_runs(folder: Path) -> tuple[Study, pl.DataFrame]:
 def stored_streams(folder: Path, study: Study) -> pl.DataFrame:
     """Returns the table of streams of a study, as ``stored_runs`` those of its runs."""
     if _is_finished(folder):
-        return _frame(folder / "streams.parquet", STREAMS)
+        return _frame(folder / "streams.parquet", STREAM_ROWS)
     store = Store(folder, study)
     return store.frames(store.everything())[1]
 

@@ -14,8 +14,8 @@ from coramp.errors import CorampError
 from coramp.messages.feed import RequestFeed
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.frames import decisions_table
-from coramp.records.outcome import LANES
 from coramp.records.schemas import TRAJECTORIES
+from coramp.road.lanes import LANES
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.snapshots import Snapshot, SnapshotVehicle
 from coramp.strategies.base import period_of

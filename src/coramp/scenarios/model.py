@@ -15,12 +15,13 @@ from pydantic import (
 
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import braking_distance_m
+from coramp.errors import CorampError
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
 from coramp.scenarios.sections import (
     FASTEST_MPS,
     Controller,
-    Drivers,
+    DriverPopulation,
     ExplicitArrival,
     Mainline,
     Model,
@@ -63,7 +64,7 @@ class Scenario(Model):
     safety: Safety = Safety()
     motion: Motion = Motion()
     control: Controller = Controller()
-    drivers: dict[str, Drivers] = Field(default_factory=dict)
+    drivers: dict[str, DriverPopulation] = Field(default_factory=dict)
     simulation: Simulation = Simulation()
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = Field(default_factory=dict)
@@ -93,9 +94,13 @@ class Scenario(Model):
             return (VehicleType(name=CAR, share=1.0, length_m=self.vehicle.length_m),)
         return self.vehicle
 
-    def type_named(self, name: str) -> VehicleType:
-        """Returns the type of that name, the first one for one that the scenario does not have."""
-        return next((t for t in self.vehicle_types if t.name == name), self.vehicle_types[0])
+    def type_named(self, name: str | None) -> VehicleType:
+        """Returns the type of that name, the first one for None; CorampError if it is not known."""
+        found = [kind for kind in self.vehicle_types if name in (None, kind.name)]
+        if not found:
+            known = ", ".join(kind.name for kind in self.vehicle_types)
+            raise CorampError(f"vehicle type {name!r} is not known; allowed is {known}")
+        return found[0]
 
     @property
     def usual_length_m(self) -> float:

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from coramp.equations.conflict_risk import GRAVITY_MPS2
-from coramp.scenarios.vehicle_types import VehicleType
+from coramp.scenarios.vehicle_types import BUILT_IN, VehicleType
+from coramp.vehicles.traits import CAR
 
 FASTEST_MPS = 60.0
 LONGEST_STEP_S = 0.25
@@ -81,7 +82,7 @@ class Ramp(Stream):
 class Vehicle(Model):
     """All vehicles are cars and alike; an explicit arrival may be longer or shorter."""
 
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = 5.0
+    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = BUILT_IN[CAR]["length_m"]
 
 
 Vehicles = Annotated[
@@ -144,7 +145,7 @@ DriverGaps = Annotated[
 ]
 
 
-class Drivers(Model):
+class DriverPopulation(Model):
     """A population of ordinary drivers for uncontrolled runs, in SUMO's terms.
 
     ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and

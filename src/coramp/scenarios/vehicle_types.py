@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from coramp.vehicles.traits import CAR_MASS_KG, Traits
+from coramp.kinematics.fuel import FUEL_MODELS, HEAVY_DUTY, PASSENGER_CAR, FuelModel
+from coramp.vehicles.traits import CAR, CAR_MASS_KG, Traits
 
 TRUCK = "truck"
 FASTEST_TYPE_MPS = 60.0
@@ -13,26 +14,35 @@ SHARES_SUM_TO = 1e-6
 """By so much may shares differ from 1 in sum."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+SumoClass = Literal["passenger", "delivery", "truck", "trailer", "bus", "coach"]
 TopSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_TYPE_MPS)]
 
-TRUCK_DEFAULTS: dict[str, Any] = {
-    "length_m": 16.5,
-    "mass_kg": 40000.0,
-    "acceleration_mps2": 1.0,
-    "power_wpkg": 5.5,
-    "braking_mps2": 2.5,
-    "top_speed_mps": (80.0 / 3.6, 90.0 / 3.6),
-    "fuel": "heavy-duty",
-    "sumo_class": "trailer",
+BUILT_IN: dict[str, dict[str, Any]] = {
+    CAR: {
+        "length_m": 5.0,
+        "mass_kg": CAR_MASS_KG,
+        "fuel": FUEL_MODELS[PASSENGER_CAR],
+        "sumo_class": "passenger",
+    },
+    TRUCK: {
+        "length_m": 16.5,
+        "mass_kg": 40000.0,
+        "acceleration_mps2": 1.0,
+        "power_wpkg": 5.5,
+        "braking_mps2": 2.5,
+        "top_speed_mps": (80.0 / 3.6, 90.0 / 3.6),
+        "fuel": FUEL_MODELS[HEAVY_DUTY],
+        "sumo_class": "trailer",
+    },
 }
-"""An articulated truck.
+"""What the built-in types have, by name; what a type leaves out is as a car's.
 
-16.5 m and 40 t: Directive 96/53/EC, Annex I. 80 to 90 km/h: the limit for trucks on motorways in
-most of Europe, and the limiter of Directive 92/6/EEC. 1 m/s2 at rest: about SUMO's vehicle class
-``trailer``. 5.5 W/kg: 340 kW (8.5 W/kg) less 10 % in the drive line, and less rolling (0.006 g v)
-and air resistance (0.5 rho c_w A v^3 / m with c_w A = 5.2 m2) at 80 km/h.
+The truck is an articulated one. 16.5 m and 40 t: Directive 96/53/EC, Annex I. 80 to 90 km/h: the
+limit for trucks on motorways in most of Europe, and the limiter of Directive 92/6/EEC. 1 m/s2 at
+rest: about SUMO's vehicle class ``trailer``. 5.5 W/kg: 340 kW (8.5 W/kg) less 10 % in the drive
+line, and less rolling (0.006 g v) and air resistance (0.5 rho c_w A v^3 / m with c_w A = 5.2 m2) at
+80 km/h.
 """
-DEFAULTS: dict[str, dict[str, Any]] = {TRUCK: TRUCK_DEFAULTS}
 
 
 class VehicleType(BaseModel):
@@ -51,8 +61,8 @@ class VehicleType(BaseModel):
     share: Share | None = None
     mainline_share: Share | None = None
     ramp_share: Share | None = None
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = 5.0
-    mass_kg: Annotated[float, Field(ge=50.0, le=200000.0)] = CAR_MASS_KG
+    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = BUILT_IN[CAR]["length_m"]
+    mass_kg: Annotated[float, Field(ge=50.0, le=200000.0)] = BUILT_IN[CAR]["mass_kg"]
     acceleration_mps2: Annotated[float, Field(ge=0.1, le=10.0)] | None = None
     power_wpkg: Annotated[float, Field(ge=0.5, le=1000.0)] | None = None
     braking_mps2: Annotated[float, Field(ge=0.5, le=10.0)] | None = None
@@ -60,8 +70,8 @@ class VehicleType(BaseModel):
     time_gap_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     positioning_error_m: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
     clock_error_s: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
-    fuel: Literal["passenger-car", "heavy-duty"] = "passenger-car"
-    sumo_class: Literal["passenger", "delivery", "truck", "trailer", "bus", "coach"] = "passenger"
+    fuel: FuelModel = BUILT_IN[CAR]["fuel"]
+    sumo_class: SumoClass = BUILT_IN[CAR]["sumo_class"]
 
     @model_validator(mode="before")
     @classmethod
@@ -69,7 +79,8 @@ class VehicleType(BaseModel):
         """Fills in what a built-in type has; a single top speed is one for all."""
         if not isinstance(data, dict):
             return data
-        data = {**DEFAULTS.get(data.get("name", ""), {}), **data}
+        name = data.get("name")
+        data = {**(BUILT_IN.get(name, {}) if isinstance(name, str) else {}), **data}
         top = data.get("top_speed_mps")
         if isinstance(top, int | float) and not isinstance(top, bool):
             data["top_speed_mps"] = (float(top), float(top))

@@ -8,12 +8,10 @@ import numpy as np
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.kinematics.trajectory import station_and_speed
+from coramp.road.lanes import ACCELERATION_LANE, MAINLINE, RAMP
 from coramp.road.rules import Rules, unpacked
 from coramp.vehicles.fleet import Fleet, committed
 from coramp.vehicles.merge_state import is_on_mainline
-
-RAMP, LANE, MAINLINE = range(3)
-"""Stages of a vehicle: before the nose, on the acceleration lane, on the mainline."""
 
 
 class Platoon(NamedTuple):
@@ -22,7 +20,8 @@ class Platoon(NamedTuple):
     ``virtual_m`` is where a vehicle counts on the mainline: where one that cruises at v0 would have
     to be now to be beside it once it has merged, but not before the tail of who is ahead of it on
     the ramp. For mainline vehicles that is their station. ``virtual_mps`` is the speed of that
-    place. ``same_road`` is the entry of the next vehicle ahead on the same road, -1 for none.
+    place. ``stage`` is the vehicle's lane (``road.lanes``). ``same_road`` is the entry of the next
+    vehicle ahead on the same road, -1 for none.
     """
 
     rows: IntArray
@@ -88,7 +87,7 @@ def _road_users(
         rows[k], stage[k] = row, MAINLINE
         virtual_m, virtual_mps = station_m, speed_mps
         if not merged:
-            stage[k] = RAMP if station_m < 0.0 else LANE
+            stage[k] = RAMP if station_m < 0.0 else ACCELERATION_LANE
             virtual_m, virtual_mps = place_on_mainline(station_m, speed_mps, rules)
         numbers[k, STATION], numbers[k, SPEED] = station_m, speed_mps
         numbers[k, LENGTH] = fleet.length_m[row]

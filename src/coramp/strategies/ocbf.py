@@ -13,9 +13,10 @@ import numpy as np
 import quadprog as untyped_quadprog
 
 from coramp._kernel import FloatArray, IntArray
+from coramp.road.lanes import ACCELERATION_LANE, MAINLINE
 from coramp.road.rules import Rules
 from coramp.strategies.base import Decision, Memory, View, held_period_s
-from coramp.strategies.feedback import LANE, MAINLINE, Platoon, virtual_platoon
+from coramp.strategies.feedback import Platoon, virtual_platoon
 from coramp.strategies.parameters import parameter
 from coramp.strategies.virtual_platoon import drive_commands
 
@@ -119,7 +120,7 @@ class Ocbf:
         same_road, merging = self.barriers(platoon, rules), self.merge_barriers(platoon, rules)
         accel_mps2 = np.zeros(len(v))
         for k in range(len(v)):
-            if platoon.stage[k] == LANE:
+            if platoon.stage[k] == ACCELERATION_LANE:
                 continue
             highest = min(
                 float(highest_mps2[k]),

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
+from coramp.road.lanes import ACCELERATION_LANE, RAMP
 from coramp.road.rules import Rules
 from coramp.strategies.base import (
     Decision,
@@ -19,7 +20,7 @@ from coramp.strategies.base import (
     View,
     held_period_s,
 )
-from coramp.strategies.feedback import LANE, RAMP, Platoon, virtual_platoon
+from coramp.strategies.feedback import Platoon, virtual_platoon
 from coramp.strategies.parameters import parameter
 
 
@@ -97,5 +98,5 @@ def drive_commands(
         for row, stage, accel in zip(
             platoon.rows.tolist(), platoon.stage.tolist(), accel_mps2.tolist(), strict=True
         )
-        if stage != LANE
+        if stage != ACCELERATION_LANE
     )

@@ -22,7 +22,7 @@ from coramp.records.files import (
     write_parquet,
     write_text,
 )
-from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAMS, Row
+from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAM_ROWS, Row
 from coramp.records.unfinished import is_unfinished
 from coramp.runs.running import RunSpec, versions
 from coramp.scenarios.loading import load_scenario
@@ -162,12 +162,12 @@ class Store:
 
     def frames(self, parts: Iterable[Part]) -> tuple[pl.DataFrame, pl.DataFrame]:
         """Returns the tables of runs and of streams, in the order of the parts."""
-        runs, streams = [pl.DataFrame(schema=RUNS)], [pl.DataFrame(schema=STREAMS)]
+        runs, streams = [pl.DataFrame(schema=RUNS)], [pl.DataFrame(schema=STREAM_ROWS)]
         left = iter(parts)
         while some := list(islice(left, ROWS_AT_A_TIME)):
             runs.append(pl.DataFrame([p.run for p in some], schema=RUNS, orient="row"))
             rows = [row for part in some for row in part.streams]
-            streams.append(pl.DataFrame(rows, schema=STREAMS, orient="row"))
+            streams.append(pl.DataFrame(rows, schema=STREAM_ROWS, orient="row"))
         return pl.concat(runs, rechunk=True), pl.concat(streams, rechunk=True)
 
     def write_tables(self, runs: pl.DataFrame, streams: pl.DataFrame, markdown: str) -> None:
@@ -219,7 +219,7 @@ def _part_in(path: Path) -> Part | None:
             return None
         if not {"status", *RUN_KEYS} <= run.keys() <= RUNS.keys():
             return None
-        if any(not {"run_id", "stream"} <= row.keys() <= STREAMS.keys() for row in streams):
+        if any(not {"run_id", "stream"} <= row.keys() <= STREAM_ROWS.keys() for row in streams):
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None

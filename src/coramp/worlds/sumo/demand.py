@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Drivers, Vehicle
+from coramp.scenarios.sections import DriverPopulation, Vehicle
 from coramp.vehicles.traits import CAR
-from coramp.worlds.sumo.traits import Traits
+from coramp.worlds.sumo.traits import DriverTraits
 
 FASTEST_COMMAND_MPS = 100.0
 """The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
@@ -60,9 +60,9 @@ def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_veh
 
 def driver_routes(
     scenario: Scenario,
-    drivers: Drivers,
+    drivers: DriverPopulation,
     arrivals: Sequence[Arrival],
-    traits: Sequence[Traits],
+    traits: Sequence[DriverTraits],
     metered: bool = False,
 ) -> str:
     """Returns the route file of an uncontrolled run with a population of drivers.
@@ -101,7 +101,7 @@ def _top_mps(arrival: Arrival) -> float:
     return math.inf if arrival.traits is None else arrival.traits.top_speed_mps
 
 
-def _ability(drivers: Drivers, arrival: Arrival) -> str:
+def _ability(drivers: DriverPopulation, arrival: Arrival) -> str:
     """Returns how a driver's vehicle accelerates where its type says so; else it is as SUMO has it.
 
     SUMO takes a profile of speeds (m/s) and accelerations for a vehicle of limited power.
@@ -123,14 +123,14 @@ def _ability(drivers: Drivers, arrival: Arrival) -> str:
     return told
 
 
-def _wish(drivers: Drivers, wish_mps: float) -> str:
+def _wish(drivers: DriverPopulation, wish_mps: float) -> str:
     """With factors the top speed is the highest wish that there can be, and so binds nobody."""
     if drivers.speed_factor is None:
         return f'maxSpeed="{wish_mps!r}" speedFactor="1" speedDev="0"'
     return f'maxSpeed="{drivers.speed_factor.high * wish_mps!r}"'
 
 
-def _manners(drivers: Drivers, tau_s: float) -> str:
+def _manners(drivers: DriverPopulation, tau_s: float) -> str:
     model = drivers.car_following
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (

@@ -10,7 +10,6 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.coordinator import Coordinator
-from coramp.coordination.driven import MAINLINE, RAMP
 from coramp.coordination.plant import Arrival
 from coramp.coordination.service import Service
 from coramp.demand.arrivals import arrivals_of
@@ -22,8 +21,9 @@ from coramp.messages.log import Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.lanes import first_on_mainline_s, seen_history
 from coramp.records.outcome import Outcome, Pieces, until_s
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Drivers
+from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.vehicles.merge_state import BY_MAINLINE_S
 from coramp.worlds.outcomes import (
@@ -151,7 +151,11 @@ def _driven(plant: CooperativePlant, vehicle_of_row: IntArray, vehicles: int) ->
 
 
 def run_uncontrolled(
-    scenario: Scenario, strategy: Decider, drivers: Drivers, seed: int, options: SumoOptions
+    scenario: Scenario,
+    strategy: Decider,
+    drivers: DriverPopulation,
+    seed: int,
+    options: SumoOptions,
 ) -> Outcome:
     """Returns what happened with SUMO's own drivers on the same arrivals, metered or not.
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from coramp.messages.commands import Command, SetSignal
+from coramp.messages.commands import SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.session import GREEN, RED, YELLOW, Session
@@ -75,7 +75,7 @@ class Meter:
         self.readings.append(DetectorReading(time_s, mainline / steps, queue / steps, passed))
         return self.readings[-1]
 
-    def obey(self, commands: Iterable[Command], step: int) -> None:
+    def obey(self, commands: Iterable[WorldCommand], step: int) -> None:
         """Sets the signal at ``step``: yellow first where it is to be red.
 
         Red waits for whom it would catch too near to the line to stop.

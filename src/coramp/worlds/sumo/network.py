@@ -21,7 +21,7 @@ import sumo
 
 from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Drivers
+from coramp.scenarios.sections import DriverPopulation
 
 LANE_WIDTH_M = 3.2
 RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})
@@ -90,7 +90,9 @@ def road_plan(scenario: Scenario) -> RoadPlan:
     )
 
 
-def driver_road_plan(scenario: Scenario, drivers: Drivers, metered: bool = False) -> RoadPlan:
+def driver_road_plan(
+    scenario: Scenario, drivers: DriverPopulation, metered: bool = False
+) -> RoadPlan:
     """Returns the plan of the road for drivers, who find their wishes on its limits.
 
     Free flow is v_R0 on the ramp; where drivers wish more or less than the common speed by a

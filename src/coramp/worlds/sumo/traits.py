@@ -10,24 +10,26 @@ from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import generator
 from coramp.road.streams import STREAMS
-from coramp.scenarios.sections import Drivers, SpeedFactor
+from coramp.scenarios.sections import DriverPopulation, SpeedFactor
 
 
 @dataclass(frozen=True)
-class Traits:
+class DriverTraits:
     """One driver: the time gap that it keeps, and its wish over the common speed, None for 1."""
 
     tau_s: float
     speed_factor: float | None
 
 
-def traits_of(drivers: Drivers, arrivals: Sequence[Arrival], seed: int) -> list[Traits]:
+def traits_of(
+    drivers: DriverPopulation, arrivals: Sequence[Arrival], seed: int
+) -> list[DriverTraits]:
     """Returns the traits of each arrival's driver.
 
     Each stream and each trait has random numbers of its own, one a vehicle in the order of
     arrival: a vehicle keeps its draw whatever else changes.
     """
-    traits: list[Traits | None] = [None] * len(arrivals)
+    traits: list[DriverTraits | None] = [None] * len(arrivals)
     for on_ramp, stream in enumerate(STREAMS):
         places = [k for k, arrival in enumerate(arrivals) if arrival.on_ramp == bool(on_ramp)]
         draws = [
@@ -37,7 +39,7 @@ def traits_of(drivers: Drivers, arrivals: Sequence[Arrival], seed: int) -> list[
         taus_s = np.array(drivers.taus_s)[(draws[0] * len(drivers.taus_s)).astype(np.int64)]
         factors = _speed_factors(drivers.speed_factor, draws[1])
         for place, tau_s, factor in zip(places, taus_s.tolist(), factors, strict=True):
-            traits[place] = Traits(tau_s, factor)
+            traits[place] = DriverTraits(tau_s, factor)
     return [found for found in traits if found is not None]
 
 

@@ -9,50 +9,20 @@ import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.errors import CorampError
-from coramp.messages.log import (
-    ACKNOWLEDGEMENT,
+from coramp.messages.kinds import (
+    CODES,
     COMMAND,
-    COMPARISON,
     END,
     ENTRY,
     KINDS,
     LOG_VERSION,
     MESSAGES,
     PIECES,
-    READING,
-    REPORT,
     REQUEST,
-    SIGNAL,
+    name_in_order,
+    place_of_each,
 )
 from coramp.road.streams import STREAMS
-
-ABOUT_VEHICLES = (REPORT, COMPARISON, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT)
-NEEDED = {
-    REPORT: ("of_s", "station_m", "speed_mps", "std_m"),
-    COMPARISON: ("of_s", "station_m", "speed_mps", "std_m"),
-    READING: ("mainline_occupancy", "queue_occupancy", "passed_veh"),
-    REQUEST: ("stream", "speed_mps", "length_m", "vehicle_type"),
-    ENTRY: PIECES,
-    COMMAND: PIECES,
-    ACKNOWLEDGEMENT: ("of_s",),
-    SIGNAL: ("green",),
-    END: (),
-}
-
-
-PLACES = {
-    REPORT: 0,
-    READING: 1,
-    REQUEST: 2,
-    ENTRY: 3,
-    COMMAND: 3,
-    ACKNOWLEDGEMENT: 3,
-    SIGNAL: 3,
-    COMPARISON: 4,
-    END: 5,
-}
-"""In which order messages of one time are told; reports with an acceleration come later."""
-OBEYING = PLACES[COMPARISON]
 
 
 @dataclass(frozen=True)
@@ -78,7 +48,7 @@ class MessageLog:
 
     def of_kind(self, *kinds: str) -> IntArray:
         """Returns the rows of these kinds."""
-        codes = [KINDS.index(kind) for kind in kinds]
+        codes = [CODES[kind] for kind in kinds]
         return np.flatnonzero(np.isin(self.kind, codes))
 
     def numbers(self, column: str) -> FloatArray:
@@ -124,7 +94,7 @@ def read_log(
         frame, keys, step = frame[places], keys[places], step[places]
     _check_order(path, frame, keys)
     _check_end(path, frame)
-    kind = frame["kind"].replace_strict(dict(zip(KINDS, range(len(KINDS)), strict=True)))
+    kind = frame["kind"].replace_strict(CODES)
     vehicle, requests, strangers = _vehicles(path, frame, of_run)
     counts = frame[PIECES[0]].list.len().fill_null(0).to_numpy()
     commands = frame.filter(pl.col("kind").is_in([ENTRY, COMMAND]))
@@ -179,7 +149,7 @@ def _refuse(path: Path, frame: pl.DataFrame, wrong: BoolArray, told: str) -> Non
 def _check_values(path: Path, frame: pl.DataFrame) -> None:
     """Refuses kinds that are none, numbers that are not finite, and what a kind lacks."""
     kinds = ", ".join(KINDS)
-    known = frame["kind"].is_in(KINDS).fill_null(value=False).to_numpy()
+    known = frame["kind"].is_in(list(KINDS)).fill_null(value=False).to_numpy()
     _refuse(path, frame, ~known, f"there is no kind {{kind!r}}; allowed are {kinds}")
     for name, kind in MESSAGES.items():
         if kind == pl.Float64:
@@ -189,9 +159,9 @@ def _check_values(path: Path, frame: pl.DataFrame) -> None:
             finite = pl.element().is_finite().fill_null(value=False).all()
             whole = frame[name].list.eval(finite).list.first().fill_null(value=True).to_numpy()
             _refuse(path, frame, ~whole, f"{name}: allowed are finite numbers")
-    for said, columns in NEEDED.items():
+    for said, known_kind in KINDS.items():
         here = (frame["kind"] == said).to_numpy()
-        for name in (*columns, *(("vehicle_id",) if said in ABOUT_VEHICLES else ())):
+        for name in known_kind.needs:
             lacks = here & frame[name].is_null().to_numpy()
             _refuse(path, frame, lacks, f"has no {name}; allowed is a value")
     counts = np.column_stack([frame[n].list.len().fill_null(0).to_numpy() for n in PIECES])
@@ -204,14 +174,11 @@ def _check_values(path: Path, frame: pl.DataFrame) -> None:
 
 def _order_of(frame: pl.DataFrame) -> IntArray:
     """Returns what messages are ordered by: time, then kind, then for positions the vehicle."""
-    obeying = (frame["kind"] == COMPARISON) | frame["accel_mps2"].is_not_null()
-    place = frame["kind"].replace_strict(PLACES, return_dtype=pl.Int64).to_numpy()
-    place = np.where(obeying.to_numpy(), OBEYING, place)
+    place = frame.select(place_of_each()).to_series().to_numpy()
+    name = frame.select(name_in_order().fill_null("")).to_series().to_numpy()
     _, time = np.unique(frame["time_s"].to_numpy(), return_inverse=True)
-    names, name = np.unique(frame["vehicle_id"].fill_null("").to_numpy(), return_inverse=True)
-    by_name = np.isin(frame["kind"].to_numpy(), (REPORT, COMPARISON))
-    within = (time * len(PLACES) + place) * len(names)
-    return np.asarray(within + np.where(by_name, name, 0), np.int64)
+    names, name = np.unique(name, return_inverse=True)
+    return np.asarray((time * len(KINDS) + place) * len(names) + name, np.int64)
 
 
 def _check_order(path: Path, frame: pl.DataFrame, keys: IntArray) -> None:
