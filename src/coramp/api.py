@@ -29,6 +29,7 @@ from coramp.studies.definition import Study, count_runs, expand, load_study, sor
 from coramp.studies.outlook import Outlook, outlook_of
 from coramp.studies.runner import ALL_WORKERS, Progress, run_missing, run_searches, usable_cores
 from coramp.studies.shown import keep_shown
+from coramp.studies.speed_unit import KMH, MPS
 from coramp.studies.store import MARK as STUDY_MARK
 from coramp.studies.store import Store
 from coramp.studies.summary import summary_tables, to_markdown
@@ -137,6 +138,7 @@ def study(
     many: bool = False,
     progress: Callable[[Progress], None] | None = None,
     notice: Callable[[str], None] | None = None,
+    kmh: bool = False,
 ) -> StudyResult:
     """Runs what a study still lacks and returns all of it.
 
@@ -146,7 +148,8 @@ def study(
     cooperative runs to another engine. ``many`` allows more than a hundred thousand runs.
     ``progress`` is called at the start and after every run, ``notice`` beforehand where the
     demand of runs is above their lane's limit, and before the runs that the report shows are made
-    once more, to keep their records. Raises CorampError for a study that cannot be run;
+    once more, to keep their records. With ``kmh`` speeds of the tables are in km/h, else in m/s;
+    columns of ``runs`` are always in m/s. Raises CorampError for a study that cannot be run;
     runs that fail are rows of the result.
     """
     definition, seeds = _defined(name, seeds, engine, many)
@@ -161,12 +164,16 @@ def study(
         notice(line)
     with connected(cluster) if cluster is not None else nullcontext():
         store = Store(_folder_of(definition, out), definition)
+        if notice is not None and store.scenario_changed:
+            notice(
+                "the scenario file was changed since: runs that the change concerns are run again"
+            )
         jobs = ALL_WORKERS if cluster is not None else jobs
         run_missing(store, specs, jobs, report)
         searched = run_searches(store, searches, jobs, report)
     everything = {spec.run_id: spec for spec in (*specs, *searched)}
     runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
-    tables = summary_tables(definition, runs)
+    tables = summary_tables(definition, runs, KMH if kmh else MPS)
     keep_shown(store.folder, definition, runs.filter(status="ok"), notice or (lambda _: None))
     store.write_tables(runs, streams, to_markdown(definition, tables))
     if definition.layout == "capacity":

@@ -386,8 +386,8 @@ GAPS = ("--set", "safety.time_gap_s=1.0", "--set", "safety.standstill_gap_m=2.5"
 def test_demand_above_the_lanes_limit_is_said_beforehand():
     told = invoke(*ABOVE, *GAPS, "--horizon", "30")
     line = (
-        "Note: 2,700 veh/h is above this lane's 2,605 (time gap 1 s, standstill gap 2.5 m): "
-        "queues will grow\n"
+        "Note: 2,700 veh/h arrive, and the lane carries 2,605 at most (time gap 1 s, standstill "
+        "gap 2.5 m): queues will grow\n"
     )
     assert told.err == line
     assert "2605" in told.out
@@ -413,8 +413,8 @@ def test_a_study_says_once_that_demand_is_above_the_limit(tmp_path):
     told = invoke("study", str(path), "--engine", "exact", "--out", str(tmp_path / "out"))
     (line,) = [line for line in told.err.splitlines() if "lane" in line]
     assert line == (
-        "Note: 2 of 3 runs are above what their lane carries; such as 1,300 veh/h is above this "
-        "lane's 1,105 (time gap 3 s): queues will grow"
+        "Note: in 2 of 3 runs more vehicles arrive than one lane can carry, so that queues grow; "
+        "in the first of them 1,300 veh/h arrive, and the lane carries 1,105 at most (time gap 3 s)"
     )
 
 

@@ -397,6 +397,12 @@ def test_errors_of_a_study_are_told_in_one_line_each(here, old, new, told):
     ("old", "new", "key", "told"),
     [
         ('["mainline-priority"]', '["mainline"]', "strateg", "there is no 'mainline'; allowed are"),
+        (
+            '["mainline-priority"]',
+            '["drivers"]',
+            "strateg",
+            "uncontrolled; drivers whom nobody controls are 'uncontrolled'",
+        ),
         ('["mainline-priority"]', '["uncontrolled"]\ndrivers = ["fast"]', "drivers", "no 'fast'"),
         ('scenario = "paper"', 'scenario = "papr"', "scenario", "did you mean paper?"),
         ("[800.0]", '[800.0]\nengine = "exactly"', "engine", "there is no 'exactly'; allowed are"),

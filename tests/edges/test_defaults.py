@@ -1,5 +1,6 @@
 """What a scenario of one's own may leave out, and speeds in km/h."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -185,11 +186,18 @@ def test_what_was_chosen_is_shown_as_toml_of_the_same_scenario(bare, tmp_path):
     told = invoke("scenarios", bare())
     assert told.code == 0
     assert (
-        "decision_station_m = -296.0  # chosen to suit the rest: possible is -370.4 to -72.1"
+        "# decision_station_m = -296.0  # follows from the range that is possible, -370.4 to -72.1"
         in (told.out)
     )
     assert "speed_mps = 30.555555555555554  # 110 km/h\n" in told.out
     assert "#   credible\n" in told.out
+    assert re.search(
+        r"^# limit_mps = .* follows from speed_mps \(1 times\)$", told.out, re.MULTILINE
+    )
+    assert re.search(r"^min_headway_s = 0\.6  # default$", told.out, re.MULTILINE)
+    given = set(re.findall(r"^(\w+) = [^#\n]*(?:# [\d.]+ km/h)?$", told.out, re.MULTILINE))
+    assert {"start_m", "speed_mps", "acceleration_lane_m"} <= given
+    assert not {"limit_mps", "entry_speed_mps", "slow_deviation"} & given
     shown = tmp_path / "shown.toml"
     shown.write_text(told.out)
     one, other = load_scenario(bare()), load_scenario(str(shown))

@@ -74,8 +74,9 @@ def test_nobody_can_change_the_registry_through_what_it_returns():
 @pytest.mark.parametrize("compiled", [True, False])
 def test_the_first_command_says_that_kernels_are_compiled(compiled, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "kernels"
+    (folder / "x").mkdir(parents=True)  # checking a scenario compiles some kernels
     if compiled:
-        folder.mkdir()
+        (folder / "x" / "separations.lane_extremes-54.py311.nbi").touch()
     monkeypatch.setattr(_kernel, "_cache_directory", lambda: folder)
     tell_of_compiling()
     said = "" if compiled else "Compiling the kernels, once (a minute or two) ...\n"

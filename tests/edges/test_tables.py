@@ -93,7 +93,8 @@ def test_the_overview_keeps_what_tells_its_rows_apart():
     shown = fitted(OVERVIEW, WIDTH)
     assert shown.columns[0] == "strategy"
     said = " ".join(shown.notes)
-    assert "In all rows: scenario paper safety.time_gap_s=1.0, engine sumo, flow" in said
+    assert "In all rows: setting time gap 1.0 s, flow (veh/h) 1800 + 500, delay" in said
+    assert "engine sumo, scenario paper" in said
     assert "delay of all (s) 1234.50 ± 0.00" in said
 
 

@@ -1,6 +1,8 @@
 """The report of a study of one's own, and speeds and delays over time in it."""
 
+import html
 import re
+import tomllib
 
 import numpy as np
 import polars as pl
@@ -13,11 +15,15 @@ from coramp.report.over_time_figure import (
     speeds_over_time_figure,
 )
 from coramp.report.page.study_answer import own_answer
+from coramp.report.page.study_repeat import repeat_command
 from coramp.report.varied_figure import varied
 from coramp.report.writing import report
+from coramp.scenarios.toml_files import builtin_text
+from coramp.studies.definition import Study, load_study
 from coramp.studies.speed_unit import KMH
 from coramp.studies.tables import Table, without_same
 from tests.edges import invoke
+from tests.report.browser import chromium, in_browser, opened
 from tests.study import overridden, run_row, runs_of
 
 STUDY = """
@@ -48,14 +54,19 @@ def captions(text):
 
 def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
     text = report(folder).read_text()
-    at = "at 900 + 400 veh/h, safety.time_gap_s=0.6"
+    at = "at 900 + 400 veh/h, 0.6 s + 0 m, seed 1"
     assert re.search(r"horizon of a run \(s\)</td><td[^>]*>60</td>", text)
     assert captions(text) == [
         "Mean delay over what varies, with 95 % intervals over seeds",
         f"Mean speed over time {at}",
         f"Mean delay over time {at}",
     ]
-    assert "Shown over time, and to be watched, are runs with safety.time_gap_s=0.6." in text
+    assert f"and the replay, are of {at.removeprefix('at ')}, one of 2 settings." in text
+    another = re.search(r"<pre[^>]*><code># another: (.*?)</code>", text, re.DOTALL).group(1)
+    assert another.splitlines()[0] == "time gap 1.0 s, seed 1"
+    assert another.count("coramp run paper --strategy") == 2
+    assert "--set safety.time_gap_s=1.0 --out out/b" in another
+    assert another.splitlines()[-1] == "coramp report out/a --against out/b"
     assert re.findall(r'id="run-\d"', text) == ['id="run-0"', 'id="run-1"', 'id="run-2"']
     assert "has kept no runs to watch" not in text
     assert "<summary>Differences on the same arrivals</summary>" in text
@@ -63,10 +74,75 @@ def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
 
 def test_the_answer_tells_each_setting_apart(folder):
     text = report(folder).read_text()
-    answer = re.search(r'id="answer">(.*?)</p>', text, re.DOTALL).group(1)
-    assert answer.count("loses least") == 2
-    assert "With safety.time_gap_s=0.6 " in answer
-    assert "With safety.time_gap_s=1.0 " in answer
+    answer = re.search(r'id="answer">(.*?)</div>', text, re.DOTALL).group(1)
+    assert re.findall(r"<li><strong>(.*?):</strong>", answer) == ["0.6 s + 0 m", "1.0 s + 0 m"]
+    assert answer.count("no control, fair drivers (who keep 1.0 s + 2.5 m)") == 2
+    assert len(re.findall(r"is best by \d+\.\d\d ± \d+\.\d\d s over", answer)) == 2
+    assert "time_gap_s" not in answer
+
+
+def test_the_files_of_ones_own_are_shown_whole_with_their_names(tmp_path):
+    scenario = builtin_text("paper")
+    (tmp_path / "roads").mkdir()
+    (tmp_path / "roads" / "mine.toml").write_text(f"# a ramp <of> mine\n{scenario}")
+    study = STUDY.replace('scenario = "paper"', 'scenario = "roads/mine.toml"')
+    (tmp_path / "asked.toml").write_text(study)
+    out = tmp_path / "o"
+    coramp.study(str(tmp_path / "asked.toml"), seeds=1, jobs=1, out=out)
+    text = report(out).read_text()
+    assert "<code>coramp study asked.toml --seeds 1</code>" in text
+    for name, content in (("asked.toml", study), ("roads/mine.toml", "# a ramp <of> mine")):
+        fold = re.search(f"<summary>{name}</summary>(.*?)</details>", text, re.DOTALL).group(1)
+        assert content in html.unescape(fold)
+    (tmp_path / "roads" / "mine.toml").write_text(f"# another\n{scenario}")
+    assert "a ramp &lt;of&gt; mine" in report(out).read_text()
+    coramp.study(str(tmp_path / "asked.toml"), seeds=1, jobs=1, out=out)
+    assert "# another\n" in report(out).read_text()
+
+
+def test_an_engine_that_an_option_chose_is_in_the_command():
+    built_in = load_study("paper")
+    assert repeat_command(built_in, {}, 3) == "coramp study paper --seeds 3"
+    moved = repeat_command(built_in.on_engine("exact"), {}, 3)
+    assert moved == "coramp study paper --seeds 3 --engine exact"
+    own = {"mine.toml": STUDY}
+    study = Study.model_validate(tomllib.loads(STUDY))
+    assert repeat_command(study, own, 2) == "coramp study mine.toml --seeds 2"
+    assert repeat_command(study.on_engine("sumo"), own, 2).endswith("--seeds 2 --engine sumo")
+
+
+@in_browser
+def test_a_phone_shows_strategy_setting_and_delay_first(folder):
+    with chromium() as browser, opened(browser, report(folder).as_uri(), 375) as page:
+        heads = page.locator("main table").first.locator("th")
+        assert heads.all_inner_texts()[:3] == ["strategy", "setting", "delay of all (s)"]
+        box = heads.nth(2).bounding_box()
+        assert box["x"] + box["width"] <= 375
+        assert page.evaluate("document.documentElement.scrollWidth") <= 375
+
+
+@in_browser
+def test_diagrams_begin_where_the_replay_stands(folder):
+    with chromium() as browser, opened(browser, report(folder).as_uri(), 1400) as page:
+        time_s = page.evaluate("coramp.shown.replay.time")
+        assert time_s > 5.0
+        for place in range(2):
+            low, high = page.evaluate(
+                f"(({{min, max}}) => [min, max])(coramp.shown.diagrams[{place}].plot.scales.x)"
+            )
+            assert low <= time_s <= high
+
+
+def test_axes_of_speeds_say_where_they_begin():
+    run = coramp.run("paper", engine="exact", horizon_s=100.0, mainline_veh_h=900)
+    figure = speeds_over_time_figure([run], KMH)
+    assert "mean speed of those on the road (km/h)" in figure.get_supylabel()
+    for axes in figure.axes:
+        low = axes.get_ylim()[0]
+        assert low == 0.0 or f"(axis from {low:g})" in axes.get_title()
+        assert low <= min(axes.get_lines()[0].get_ydata())
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+    assert delays_over_time_figure([run]).axes[-1].get_xlabel() == "time when due (s)"
 
 
 def test_numbers_stand_to_the_right(folder):
@@ -94,8 +170,8 @@ def test_the_report_of_a_run_has_speed_and_delay_over_time_too(tmp_path):
     text = (out / "report.html").read_text()
     assert len(captions(text)) == 2
     assert "-400 to 400 m, 72 km/h" in text
-    assert "mainline speed, mean (km/h)" in text
-    told = float(re.search(r"mainline speed, mean \(km/h\)</td><td[^>]*>([\d.]+)<", text).group(1))
+    assert "mainline speed (km/h)" in text
+    told = float(re.search(r"mainline speed \(km/h\)</td><td[^>]*>([\d.]+)<", text).group(1))
     assert told == pytest.approx(3.6 * coramp.load(out).summary["mainline_speed_mps"], abs=0.006)
     assert "--kmh" in invoke("report", "--help").out
 
@@ -128,18 +204,24 @@ def test_the_answer_says_how_sure_it_is():
         return [run_row(strategy, seed=s, delay_s=d) for s, d in enumerate(by_seed, 1)]
 
     good = runs_of(*delays("slots", (1.0, 5.0, 9.0)), *delays("game", (1.5, 5.7, 9.6)))
-    assert own_answer(good) == (
-        "At 800 + 200 veh/h, on the same arrivals: Slots loses least, 5.00 ± 9.94 s a vehicle; "
-        "game 0.60 ± 0.25 s more."
+    told = own_answer(good)
+    assert told.lead == (
+        "At 800 + 200 veh/h, seconds that a vehicle loses (mean over 3 seeds ± 95 % interval):"
+    )
+    assert told.items == (
+        (
+            "",
+            "slots 5.00 ± 9.94 s, game 5.60 ± 10.06 s. Slots is best by 0.60 ± 0.25 s over game.",
+        ),
     )
     good = runs_of(*delays("slots", (1.0, 5.0, 9.0)), *delays("game", (1.5, 4.7, 9.6)))
-    assert own_answer(good).endswith("s more, which may be chance.")
+    assert own_answer(good).items[0][1].endswith("s over game (may be chance).")
     once = runs_of(
         *delays("slots", (1.0,)), overridden(run_row(delay_s=3.0), "safety.adhesion=0.3")
     )
-    assert "Slots loses least, 1.00 s a vehicle." in own_answer(once)
+    assert own_answer(once).items[0] == ("as in the scenario", "slots 1.00 s.")
     named = own_answer(once, {"safety": {"adhesion": 0.4}})
-    assert "With safety.adhesion=0.4 slots loses least" in named
+    assert [label for label, _ in named.items] == ["adhesion φ 0.4", "adhesion φ 0.3"]
 
 
 def test_what_a_run_does_not_set_stands_in_its_place_among_what_others_set():

@@ -101,6 +101,14 @@ def test_no_two_known_strategies_share_colour_and_marker():
     assert {marker for _, marker in drawn}.isdisjoint(FREE_MARKERS)
 
 
+def test_metered_drivers_are_named_with_their_population_and_look_unlike_all_others():
+    fair, credible = (look_of("alinea", drivers) for drivers in ("fair", "credible"))
+    assert (fair.label, credible.label) == ("ALINEA, fair drivers", "ALINEA, credible drivers")
+    assert fair.colour != credible.colour
+    known = [*COOPERATIVE.values(), *METERED.values(), *UNCONTROLLED.values()]
+    assert fair.marker not in {look.marker for look in known}
+
+
 def test_gains_stand_beside_each_other_and_beside_the_papers(runs):
     axes = gain_figure(runs).axes
     by_title = {a.get_title(): a for a in axes}

@@ -89,8 +89,8 @@ def test_the_front_by_hand():
 def test_ranks_by_hand():
     found = {name: estimate([value]) for name, value in (("a", 2.0), ("b", 1.0), ("c", 1.001))}
     found["d"] = estimate([])
-    assert ranks(Metric("", ""), found) == {"a": 3, "b": 1, "c": 1}
-    assert ranks(Metric("", "", True), found) == {"a": 1, "b": 2, "c": 2}
+    assert ranks(Metric(""), found) == {"a": 3, "b": 1, "c": 1}
+    assert ranks(Metric("", True), found) == {"a": 1, "b": 2, "c": 2}
 
 
 def test_the_tables_of_the_field(field):

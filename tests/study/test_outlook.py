@@ -7,6 +7,8 @@ import pytest
 import coramp
 from coramp.api import outlook
 from coramp.cli.entry import main
+from coramp.report.study_folder import scenario_of
+from coramp.scenarios.toml_files import builtin_text
 from tests.study import GRID, written
 
 
@@ -28,6 +30,47 @@ def test_the_status_counts_what_is_done_and_what_is_damaged(tmp_path):
     part.write_bytes(part.read_bytes()[:-40])
     seen = outlook(definition, out=folder)
     assert (seen.done, seen.damaged, seen.missing, seen.failed) == (5, 1, 1, 0)
+
+
+def test_rows_of_a_scenario_file_that_was_changed_since_are_told(tmp_path, capsys):
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(builtin_text("paper"))
+    definition = written(tmp_path, GRID.replace('scenario = "paper"', 'scenario = "mine.toml"'))
+    folder = tmp_path / "o"
+    first = coramp.study(definition, jobs=1, out=folder)
+    assert outlook(definition, out=folder).outdated == 0
+    scenario.write_text(scenario.read_text().replace("min_headway_s = 0.6", "min_headway_s = 0.7"))
+    seen = outlook(definition, out=folder)
+    assert (seen.done, seen.missing, seen.outdated) == (0, 6, 6)
+    with pytest.raises(SystemExit):
+        main(["study", definition, "--status", "--out", str(folder)])
+    told = capsys.readouterr().out
+    assert "kept, but of the scenario file before it was changed" in told
+    assert "the tables and the report in the folder are of the old file" in " ".join(told.split())
+    notices = []
+    again = coramp.study(definition, jobs=1, out=folder, notice=notices.append)
+    assert any("scenario file was changed since" in line for line in notices)
+    assert not set(again.runs["run_id"]) & set(first.runs["run_id"])
+    assert outlook(definition, out=folder).outdated == 0
+    assert scenario_of(folder)["mainline"]["min_headway_s"] == 0.7
+
+
+def test_a_dry_run_says_that_compiling_is_left_out(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["study", written(tmp_path), "--dry-run", "--out", str(tmp_path / "o")])
+    assert "expected duration leaves out compiling" in " ".join(capsys.readouterr().out.split())
+
+
+def test_speeds_of_a_studys_tables_can_be_in_kmh(tmp_path):
+    definition = written(tmp_path)
+    mps, kmh = (coramp.study(definition, jobs=1, out=tmp_path / "o", kmh=k) for k in (False, True))
+    tables = [next(t for t in result.tables if t.title == "All runs") for result in (mps, kmh)]
+    one, other = (
+        [float(row[t.columns.index(f"mainline speed ({unit})")].split()[0]) for row in t.rows]
+        for t, unit in zip(tables, ("m/s", "km/h"), strict=True)
+    )
+    assert other == pytest.approx([3.6 * v for v in one], abs=0.03)
+    assert mps.runs.equals(kmh.runs)
 
 
 def test_half_the_processes_take_twice_as_long(tmp_path):

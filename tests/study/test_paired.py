@@ -64,7 +64,7 @@ def test_an_interval_with_zero_in_it_is_not_sure():
 def test_settings_are_compared_where_they_say_nothing_of_arrivals():
     gap = delays("slots", (1.2, 5.1, 9.3), "safety.time_gap_s=1.0")
     (found,) = differences(runs_of(*SLOTS, *gap))
-    assert found.more.name == "slots, safety.time_gap_s=1.0"
+    assert found.more.name == "slots, time gap 1.0 s"
     entry = delays("slots", (1.2, 5.1, 9.3), "mainline.entry_speed_mps=17.0")
     assert differences(runs_of(*SLOTS, *entry)) == []
 
@@ -88,6 +88,22 @@ def test_of_many_only_pairs_with_the_best_are_told():
     assert len(names) > EVERY_PAIR_OF
     assert len(found) == len(names) - 1
     assert {difference.less.strategy for difference in found} == {"slots"}
+
+
+def test_two_populations_of_drivers_are_not_compared():
+    fair = delays("uncontrolled", (2.0, 6.0, 10.0), drivers="fair")
+    credible = delays("uncontrolled", (3.0, 7.1, 11.0), drivers="credible")
+    metered = delays("alinea", (3.5, 7.2, 11.9), drivers="credible")
+    runs = runs_of(*SLOTS, *OTHER, *fair, *credible, *metered)
+    pairs = {frozenset({d.less.name, d.more.name}) for d in differences(runs)}
+    of_fair, of_credible = "uncontrolled (fair drivers)", "uncontrolled (credible drivers)"
+    assert {of_fair, "slots"} in pairs
+    assert {of_credible, "slots"} in pairs
+    assert {"alinea (credible drivers)", "slots"} in pairs
+    assert not any({of_fair, of_credible} <= pair for pair in pairs)
+    assert not any({of_fair, "alinea (credible drivers)"} <= pair for pair in pairs)
+    assert "two populations are not compared" in paired_table(runs).notes[-1]
+    assert differences(runs_of(*fair, *credible)) == []
 
 
 def test_a_study_of_ones_own_has_the_table():
@@ -124,7 +140,8 @@ def test_delay_and_the_difference_are_drawn_over_what_varies():
     runs = runs_of(*low, *low_other, *gap, *other)
     assert dimensions(varied(runs)) == ["safety.time_gap_s", "strategy"]
     figure = varied_figure(runs)
-    assert [axes.get_title() for axes in figure.axes[:3]] == ["all", "mainline", "ramp"]
+    assert [axes.get_title() for axes in figure.axes[:3]] == ["all vehicles", "mainline", "ramp"]
+    assert figure.axes[-1].get_xlabel() == "time gap (s)"
     assert [t.get_text() for t in figure.axes[-1].get_xticklabels()] == ["0.6", "1"]
     means = errorbars(figure.axes[0])
     assert means["slots"][0] == pytest.approx([5.0, 6.0])

@@ -16,7 +16,7 @@ from coramp.studies.summary import (
     to_markdown,
 )
 from coramp.studies.tables import Table, number, with_interval
-from tests.study import run_row, runs_of
+from tests.study import overridden, run_row, runs_of
 
 values = st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=12)
 
@@ -113,21 +113,21 @@ def test_runs_that_differ_by_their_seed_alone_are_one_row_of_the_overview():
     runs = runs_of(
         run_row(seed=1, mainline_delay_s=1.0, ramp_delay_s=0.5, unserved=1, min_ttc_s=4.0),
         run_row(seed=2, mainline_delay_s=3.0, unserved=2, min_ttc_s=3.0, max_decel_mps2=2.5),
-        run_row(seed=1, overrides="safety.adhesion=0.1", mainline_delay_s=7.0),
+        overridden(run_row(seed=1, mainline_delay_s=7.0), "safety.adhesion=0.1"),
         run_row("uncontrolled", drivers="paper", mainline_delay_s=5.0),
     )
     table = overview(runs)
     rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
-    assert [(row["scenario"], row["strategy"], row["runs"]) for row in rows] == [
-        ("paper", "mainline-priority", "2"),
-        ("paper safety.adhesion=0.1", "mainline-priority", "1"),
-        ("paper", "uncontrolled (paper)", "1"),
+    assert [(row["setting"], row["strategy"], row["runs"]) for row in rows] == [
+        ("as in the scenario", "mainline-priority", "2"),
+        ("adhesion φ 0.1", "mainline-priority", "1"),
+        ("as in the scenario", "uncontrolled (paper)", "1"),
     ]
     half = 12.7062 * math.sqrt(2.0) / math.sqrt(2.0)
     assert rows[0]["mainline delay (s)"] == f"2.00 ± {half:.2f}"
     assert rows[0]["ramp delay (s)"] == "0.50"
     assert rows[0]["unserved"] == "3"
-    assert rows[0]["min TTC (s)"] == "3.00"
+    assert rows[0]["smallest TTC (s)"] == "3.00"
     assert rows[0]["hardest braking (m/s2)"] == "2.50"
     assert rows[1]["fuel (l)"] == "-"
     assert rows[2]["flow (veh/h)"] == "800 + 200"

@@ -37,6 +37,22 @@ def test_nobody_collides_and_nobody_brakes_as_if_the_signal_fell_from_the_sky(me
     assert metered.summary["max_decel_mps2"] < 6.0  # drivers' noise alone makes 5.4
 
 
+def test_red_waits_for_a_truck_that_can_no_longer_stop():
+    mix = [{"name": "car", "share": 0.88}, {"name": "truck", "share": 0.12}]
+    run = coramp.run(
+        "expressway",
+        "alinea",
+        drivers="credible",
+        mainline_veh_h=1800.0,
+        ramp_veh_h=500.0,
+        seed=2,
+        horizon_s=195.0,
+        overrides={"vehicle": mix},
+    )
+    # with 2 s of yellow r00023 comes to 1.3 m before the line at 17 m/s, and SUMO stops it there
+    assert run.summary["max_decel_mps2"] < 7.0
+
+
 def test_vehicles_leave_the_ramp_one_by_one_at_the_lowest_rate():
     strict = {"target_occupancy_percent": 1.0, "queue_occupancy_percent": 100.0}
     overrides = {f"strategy.alinea.{key}": value for key, value in strict.items()}

@@ -23,10 +23,16 @@ from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
 from coramp.runs.running import finite_or_none
 from coramp.studies.outlook import Outlook
+from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
 
 if TYPE_CHECKING:
     from coramp.report.figures import FigureSet
+
+WITHOUT_COMPILING = (
+    "The expected duration leaves out compiling: the first runs after an installation take up to a "
+    "few minutes more."
+)
 
 
 def print_json(data: Any) -> None:
@@ -83,9 +89,11 @@ def working(text: str) -> Iterator[None]:
         yield
 
 
-def print_run(result: RunResult, out: Path | None, wide: bool = False) -> None:
-    """Prints the summary of a run and where its records lie."""
-    print_table(run_table(result.summary), wide)
+def print_run(
+    result: RunResult, out: Path | None, wide: bool = False, unit: SpeedUnit = MPS
+) -> None:
+    """Prints the summary of a run, with speeds in a unit, and where its records lie."""
+    print_table(run_table(result.summary, unit), wide)
     if out is not None:
         print(f"Records are in {out}; coramp explain {out} VEHICLE explains one vehicle's plan.")
 
@@ -254,10 +262,18 @@ def print_outlook(ahead: Outlook, wide: bool = False) -> None:
         ("damaged, to run again", str(ahead.damaged)),
         ("to run", str(ahead.missing)),
     ]
+    if ahead.outdated:
+        rows.append(("kept, but of the scenario file before it was changed", str(ahead.outdated)))
     if ahead.searches_at_most:
         rows.append(("more for breakdown searches, at most", str(ahead.searches_at_most)))
     rows.append(("expected duration (s)", f"{ahead.expected_s:.0f} (jobs: {ahead.jobs})"))
-    print_table(Table("Outlook", ("what", "value"), tuple(rows)), wide)
+    notes = [WITHOUT_COMPILING] if ahead.missing else []
+    if ahead.outdated:
+        notes.append(
+            "The scenario file has changed since: the tables and the report in the folder are of "
+            "the old file. coramp study runs everything again that the change concerns."
+        )
+    print_table(Table("Outlook", ("what", "value"), tuple(rows), tuple(notes)), wide)
 
 
 def outlook_json(ahead: Outlook) -> Row:

@@ -13,6 +13,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 Wide = Annotated[
     bool, typer.Option("--wide", help="Print all columns of tables, not only those that fit.")
 ]
+Kmh = Annotated[bool, typer.Option("--kmh", help="Show speeds in km/h.")]
 StrategyName = Annotated[
     str,
     typer.Option(

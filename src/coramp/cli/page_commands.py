@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from coramp.cli.options import Json, ScenarioName, Wide
+from coramp.cli.options import Json, Kmh, ScenarioName, Wide
 
 showing = typer.Typer(rich_markup_mode=None)
 
@@ -45,7 +45,7 @@ def report(
         Path | None,
         typer.Option(metavar="DIR", help="Another run on the same arrivals, shown beside it."),
     ] = None,
-    kmh: Annotated[bool, typer.Option("--kmh", help="Show speeds in km/h.")] = False,
+    kmh: Kmh = False,
 ) -> None:
     """Write DIR/report.html, one file that needs no network."""
     from coramp.cli.console import written

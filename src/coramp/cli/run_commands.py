@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from coramp.cli.completion import snapshot_names, study_names
-from coramp.cli.options import UNSAFE, WRONG, Json, ScenarioName, StrategyName, Wide
+from coramp.cli.options import UNSAFE, WRONG, Json, Kmh, ScenarioName, StrategyName, Wide
 from coramp.errors import CorampError
 
 computing = typer.Typer(rich_markup_mode=None)
@@ -69,6 +69,7 @@ def run(
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
     json: Json = False,
     wide: Wide = False,
+    kmh: Kmh = False,
 ) -> None:
     """Run a scenario once."""
     from coramp.api import run as run_scenario
@@ -80,6 +81,7 @@ def run(
         working,
     )
     from coramp.scenarios.toml_files import parse_overrides
+    from coramp.studies.speed_unit import KMH, MPS
 
     if keep_messages and out is None:
         raise CorampError("--keep-messages: there is no folder to keep them in; give --out DIR")
@@ -104,7 +106,7 @@ def run(
     if json:
         print_json(result.content)
     else:
-        print_run(result, out, wide)
+        print_run(result, out, wide, KMH if kmh else MPS)
     _exit_if_broken(result.broken_promises)
 
 
@@ -133,6 +135,7 @@ def study(
     yes: Annotated[bool, typer.Option("--yes", help="Allow more than 100,000 runs.")] = False,
     json: Json = False,
     wide: Wide = False,
+    kmh: Kmh = False,
 ) -> None:
     """Run a grid of runs; resume where an earlier start stopped."""
     from coramp.api import outlook
@@ -168,6 +171,7 @@ def study(
             many=yes,
             progress=progress,
             notice=tell_of_demand,
+            kmh=kmh,
         )
     if json:
         print_json(study_json(result))

@@ -31,8 +31,8 @@ class StudyProgress:
             disable=not self._console.is_terminal,
         )
         self._task = self._bar.add_task("runs", total=None, rate="", last="")
-        self._started = time.monotonic()
-        self._told = self._started
+        self._told = time.monotonic()
+        self._first: tuple[int, float] | None = None
 
     def __enter__(self) -> Self:
         self._bar.start()
@@ -51,15 +51,14 @@ class StudyProgress:
         if state.last is None:
             self._begin(state)
             return
-        elapsed_s = time.monotonic() - self._started
-        rate = state.done / elapsed_s if elapsed_s > 0.0 else 0.0
+        rate = self._rate(state.done)
         finished = state.skipped + state.done
         failed = f", {state.failed} failed" if state.failed else ""
         self._bar.update(
             self._task,
             completed=finished,
             total=state.total,
-            rate=f"{rate:.1f}/s{failed}",
+            rate=f"{f'{rate:.1f}/s' if rate else ''}{failed}",
             last=_last(state),
         )
         if not self._console.is_terminal and (
@@ -67,12 +66,21 @@ class StudyProgress:
         ):
             self._told = time.monotonic()
             left_s = (state.total - finished) / rate if rate else 0.0
-            self._console.print(
-                f"{finished} of {state.total} runs{failed}, {rate:.1f}/s, {left_s:.0f} s left"
-            )
+            left = f", {rate:.1f}/s, {left_s:.0f} s left" if rate else ""
+            self._console.print(f"{finished} of {state.total} runs{failed}{left}")
+
+    def _rate(self, done: int) -> float:
+        """Runs a second since the first was done: that one may have waited for compiling."""
+        now_s = time.monotonic()
+        if self._first is None:
+            self._first = done, now_s
+        runs, since_s = self._first
+        if done == runs:
+            return 0.0
+        return (done - runs) / (now_s - since_s) if now_s > since_s else 0.0
 
     def _begin(self, state: StudyState) -> None:
-        self._started = self._told = time.monotonic()
+        self._told, self._first = time.monotonic(), None
         if state.skipped:
             self._console.print(f"{state.skipped} of {state.total} runs are there already")
         if state.damaged:

@@ -28,7 +28,11 @@ from coramp.scenarios.model import Scenario
 
 
 def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
-    """Returns how near vehicles came and how hard they braked; null where no two met."""
+    """Returns how near vehicles came and how hard they braked; null where no two met.
+
+    ``max_decel_mps2`` is the hardest of anyone and positive. For drivers it is what SUMO reported
+    step by step: a vehicle that SUMO stops where it can go no further has all its speed in a step.
+    """
     mainline, ramp = _extremes_of_lanes(outcome, scenario)
     margin_m, equation = _least_margin(mainline, ramp)
     return {

@@ -4,6 +4,8 @@ from typing import Any
 
 import polars as pl
 
+from coramp.strategies.situation import RUNGS
+
 Row = dict[str, Any]
 """One row of a table, by column."""
 Schema = dict[str, type[pl.DataType] | pl.DataType]
@@ -165,11 +167,7 @@ _FIRST_METRICS: Schema = {
     "max_decel_mps2": pl.Float64,
     "plan_error_m": pl.Float64,
     "adjusted_vehicles": pl.Int64,
-    "rung_free": pl.Int64,
-    "rung_reach": pl.Int64,
-    "rung_create": pl.Int64,
-    "rung_delay": pl.Int64,
-    "rung_hold": pl.Int64,
+    **{f"rung_{rung}": pl.Int64 for rung in RUNGS},
     "refused_plans": pl.Int64,
     "interventions": pl.Int64,
     "max_jerk_mps3": pl.Float64,

@@ -17,13 +17,11 @@ from coramp.studies.field_layout import (
     ranges,
     with_derived,
 )
+from coramp.studies.metric_labels import label_of, typeset
 
 SHOWN = {
-    DELAY: "delay of all (s)",
-    FUEL: "fuel (ml/vehicle)",
-    "min_ttc_s": "smallest TTC (s)",
-    "max_decel_mps2": "hardest braking (m/s²)",
-    "max_jerk_mps3": "jerk (m/s³)",
+    column: typeset(label_of(column))
+    for column in (DELAY, FUEL, "min_ttc_s", "max_decel_mps2", "max_jerk_mps3")
 }
 LOGARITHMIC = {DELAY}
 

@@ -21,6 +21,8 @@ from coramp.report.style import (
     new_figure,
 )
 from coramp.road.streams import STREAMS
+from coramp.strategies.situation import RUNGS
+from coramp.studies.metric_labels import RUNG_COLUMNS
 from coramp.studies.paper_layout import (
     LEAST_BASELINE_S,
     POPULATIONS,
@@ -36,7 +38,8 @@ PRINTED = {"mainline": MAINLINE_DELAY_S, "ramp": RAMP_DELAY_S}
 CELLS = [Cell(s, None) for s in STRATEGIES] + [Cell("uncontrolled", p) for p in POPULATIONS]
 LINEAR_TO_S = 0.1
 """Up to here the axis of delays is linear, beyond it logarithmic."""
-RUNGS = {"free": SKY, "reach": BLUE, "create": ORANGE, "delay": GREEN}
+*MERGING, HOLD = RUNGS
+RUNG_COLOURS = dict(zip(MERGING, (SKY, BLUE, ORANGE, GREEN), strict=True))
 RUNG_WORDS = {
     "free": "free: as it is",
     "reach": "reach: speeds up or slows down into a gap",
@@ -169,7 +172,7 @@ def rung_figure(runs: pl.DataFrame) -> Figure:
     for axes, strategy in zip(diagrams, STRATEGIES, strict=True):
         shares, held = rung_shares(runs, strategy, flows)
         bottom = np.zeros(len(flows))
-        for (rung, colour), hatch in zip(RUNGS.items(), HATCHES, strict=False):
+        for (rung, colour), hatch in zip(RUNG_COLOURS.items(), HATCHES, strict=False):
             if shares[rung].any():
                 _draw_rung(axes, rung, shares[rung], bottom, (colour, hatch))
             bottom += shares[rung]
@@ -213,13 +216,13 @@ def rung_shares(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Returns each rung's share (%) of all merges at each flow, and of vehicles that waited."""
     plain = runs.filter(pl.col("overrides").is_null() & (pl.col("strategy") == strategy))
-    counts = np.zeros((len(RUNGS) + 1, len(flows)))
+    counts = np.zeros((len(RUNGS), len(flows)))
     for k, (mainline, ramp) in enumerate(flows):
         at = plain.filter(mainline_veh_h=float(mainline), ramp_veh_h=float(ramp))
-        counts[:, k] = [at[f"rung_{rung}"].sum() for rung in (*RUNGS, "hold")]
+        counts[:, k] = [at[RUNG_COLUMNS[rung]].sum() for rung in (*MERGING, HOLD)]
     merges = np.maximum(1.0, counts[:-1].sum(axis=0))
     shares = 100.0 * counts / merges
-    return dict(zip(RUNGS, shares, strict=False)), shares[-1]
+    return dict(zip(MERGING, shares, strict=False)), shares[-1]
 
 
 def _label_flows(axes: Axes, flows: Sequence[Flows], upright: bool = False) -> None:

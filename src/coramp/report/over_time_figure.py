@@ -1,5 +1,6 @@
 """Speed and delay over time of runs on the same arrivals, a line each."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -16,6 +17,9 @@ from coramp.studies.speed_unit import MPS, SpeedUnit
 MEAN_OVER_S = 60.0
 """Lines are means over so long, a tenth of a short run's horizon, but over 10 s at least."""
 SHARE, LEAST_S = 0.1, 10.0
+ZERO_BELOW = 0.5
+"""An axis of speeds begins at 0 where the lowest is below this share of the highest."""
+TICK = 5.0
 Line = tuple[np.ndarray, np.ndarray]
 
 
@@ -31,7 +35,10 @@ def speeds_over_time_figure(runs: Sequence[RunRecords], unit: SpeedUnit = MPS) -
         )
         return times_s, speeds_mps * unit.per_mps
 
-    return _figure(runs, speeds, f"mean speed ({unit.name})")
+    figure = _figure(runs, speeds, (f"mean speed of those on the road ({unit.name})", "time (s)"))
+    for axes in figure.axes:
+        _begin_near_the_lines(axes)
+    return figure
 
 
 def delays_over_time_figure(runs: Sequence[RunRecords]) -> Figure:
@@ -41,7 +48,21 @@ def delays_over_time_figure(runs: Sequence[RunRecords]) -> Figure:
         here = run.vehicles.filter(stream=stream).with_columns(count=pl.lit(1))
         return binned(here, ("scheduled_s", "delay_s", "count"), _step_s(run))
 
-    return _figure(runs, delays, "mean delay by scheduled time (s)")
+    figure = _figure(runs, delays, ("mean delay of those due then (s)", "time when due (s)"))
+    for axes in figure.axes:
+        axes.set_ylim(min(0.0, axes.get_ylim()[0]), None)
+    return figure
+
+
+def _begin_near_the_lines(axes: Axes) -> None:
+    """Lets an axis of speeds begin near the lowest, and says so: from 0 all lines lie on top."""
+    low, high = axes.get_ylim()
+    if not axes.get_lines() or low <= ZERO_BELOW * high:
+        axes.set_ylim(0.0, None)
+        return
+    start = TICK * math.floor(low / TICK)
+    axes.set_ylim(start, None)
+    axes.set_title(f"{axes.get_title()} (axis from {start:g})")
 
 
 def binned(frame: pl.DataFrame, columns: tuple[str, str, str], step_s: float) -> Line:
@@ -67,16 +88,20 @@ def _step_s(run: RunRecords) -> float:
 
 
 def _figure(
-    runs: Sequence[RunRecords], line_of: Callable[[RunRecords, str], Line], name: str
+    runs: Sequence[RunRecords],
+    line_of: Callable[[RunRecords, str], Line],
+    names: tuple[str, str],
 ) -> Figure:
+    """A diagram a stream and a line a run; ``names`` are those of what is shown and of its time."""
     figure = new_figure(9.0, 4.6)
     diagrams = figure.subplots(2, 1, sharex=True)
     for axes, stream in zip(diagrams, STREAMS, strict=True):
         for run in runs:
             _draw(axes, run, line_of(run, stream))
-        axes.set(title=stream, ylim=(min(0.0, axes.get_ylim()[0]), None))
+        axes.set(title=stream, xlim=(0.0, None))
+    name, time = names
     figure.supylabel(name, fontsize=9)
-    diagrams[-1].set_xlabel("time (s)")
+    diagrams[-1].set_xlabel(time)
     grid(*diagrams)
     legend_below(figure, diagrams, 3)
     return figure

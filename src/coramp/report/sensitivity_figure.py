@@ -13,16 +13,9 @@ from coramp.road.streams import STREAMS
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.overrides import overrides_of
 from coramp.studies.sensitivity_layout import BREAKDOWN_DELAY_S
+from coramp.studies.setting_words import NAMES, key_name
 from coramp.studies.statistics import Estimate, estimate
 
-KEYS = {
-    "safety.positioning_error_m": "positioning error L₁ (m)",
-    "safety.clock_error_s": "clock error ε (s)",
-    "safety.adhesion": "adhesion φ (no unit)",
-    "safety.time_gap_s": "time gap (s)",
-    "safety.standstill_gap_m": "standstill gap (m)",
-}
-"""What the keys of the built-in study are called; others keep their names."""
 FLAT_S = 0.5
 """By so much at most the mean delays of a setting differ that shares its diagram with others."""
 Settings = list[tuple[float, str | None]]
@@ -55,7 +48,7 @@ def sensitivity_figure(runs: pl.DataFrame) -> Figure:
             _finish(axes)
         row[0].set_ylabel(f"mean {stream} delay (s)")
     for axes, key in zip(diagrams[-1][bool(flat) :], others, strict=True):
-        axes.set_xlabel(KEYS.get(key, key))
+        axes.set_xlabel(key_name(key))
     diagrams[0, 0].set_ylim(bottom=0.0)
     diagrams[0, 0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     legend_below(figure, diagrams.flat, 3 if columns < 3 else 5)
@@ -103,7 +96,7 @@ def _draw_flat(axes: Axes, runs: pl.DataFrame, settings: dict[str, Settings], st
         )
     names = []
     for key, values in settings.items():
-        word, _, unit = KEYS.get(key, key).partition(" (")
+        word, _, unit = key_name(key).partition(" (")
         unit = "" if unit in ("", "no unit)") else f" {unit.removesuffix(')')}"
         names.append(f"{word},\n{values[0][0]:g} to {values[-1][0]:g}{unit}")
     axes.set_xticks(range(len(settings)), names, fontsize=8)
@@ -142,7 +135,7 @@ def settings_of(runs: pl.DataFrame) -> dict[str, Settings]:
         scenario = load_scenario(plain["scenario"][0]).model_dump()
         for key, values in found.items():
             values.append((_looked_up(scenario, key), None))
-    order = sorted(found, key=lambda key: list(KEYS).index(key) if key in KEYS else len(KEYS))
+    order = sorted(found, key=lambda key: list(NAMES).index(key) if key in NAMES else len(NAMES))
     return {key: sorted(found[key], key=lambda v: v[0]) for key in order}
 
 

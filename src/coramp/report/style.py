@@ -7,7 +7,7 @@ differ as well, so that a print in grey can be read.
 import io
 import zlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -77,6 +77,8 @@ COOPERATIVE = {
     "slots": Look("slots", VERMILION, "o", "-"),
 }
 METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
+METERED_MARKER = "H"
+"""Of metered drivers, who have the colour of the same drivers without control."""
 
 
 FREE_MARKERS = "h>d1"
@@ -92,9 +94,20 @@ def look_of(strategy: str, drivers: str | None = None) -> Look:
     if drivers is not None and strategy == "uncontrolled":
         known = UNCONTROLLED.get(drivers)
     else:
-        known = COOPERATIVE.get(strategy) or METERED.get(strategy)
+        known = COOPERATIVE.get(strategy) or _metered(strategy, drivers)
     name = f"{strategy} ({drivers})" if drivers else strategy
     return known or _look_of_another(name)
+
+
+def _metered(strategy: str, drivers: str | None) -> Look | None:
+    """A metering strategy; where its drivers are known, with their name and colour."""
+    known = METERED.get(strategy)
+    if known is None or drivers is None:
+        return known
+    of_drivers = UNCONTROLLED.get(drivers)
+    colour = known.colour if of_drivers is None else of_drivers.colour
+    label = f"{known.label}, {drivers} drivers"
+    return replace(known, label=label, colour=colour, marker=METERED_MARKER)
 
 
 def _look_of_another(name: str) -> Look:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from coramp.errors import CorampError
 from coramp.report.style import BLACK, COLOURS, Look, grid, legend_below, look_of, new_figure
 from coramp.studies.overrides import overrides_of, scenario_value
+from coramp.studies.setting_words import key_name
 from coramp.studies.statistics import estimate
 
 DELAYS = {"all": "delay_s", "mainline": "mainline_delay_s", "ramp": "ramp_delay_s"}
@@ -120,7 +121,7 @@ def varied_figure(
     diagrams = figure.subplots(rows, len(DELAYS), squeeze=False, sharex=True)
     for place, panel in enumerate(panels):
         here = [run for run in runs if tuple(run.values[n] for n in others) == panel]
-        title = ", ".join(f"{n} {_text(v)}" for n, v in zip(others, panel, strict=True))
+        title = ", ".join(f"{_axis_name(n)} {_text(v)}" for n, v in zip(others, panel, strict=True))
         row = diagrams[place * (2 if paired else 1)]
         _draw_delays(row, here, over, looks, title)
         if paired:
@@ -148,7 +149,8 @@ def _draw_delays(
                 for place in places
             }
             _draw_line(axes, places, found, (look, offset))
-        axes.set_title(f"{stream}\n{title}" if title else stream)
+        name = "all vehicles" if stream == "all" else stream
+        axes.set_title(f"{name}\n{title}" if title else name)
         _label(axes, places, over)
     row[0].set_ylabel("mean delay (s)")
 
@@ -247,4 +249,4 @@ def _label(axes: Axes, places: Sequence[Any], over: str) -> None:
 
 
 def _axis_name(over: str) -> str:
-    return {FLOW: "flow, mainline + ramp (veh/h)", STRATEGY: ""}.get(over, over)
+    return {FLOW: "flow, mainline + ramp (veh/h)", STRATEGY: "strategy"}.get(over) or key_name(over)

@@ -12,7 +12,13 @@ OF_AUTOMATION = ("safety.", "motion.")
 
 
 def demand_above_limit(spec: RunSpec) -> str | None:
-    """Returns in a line that a cooperative run's flows are above its lane's limit, else None.
+    """Returns in a line that a cooperative run's flows are above its lane's limit, else None."""
+    found = _above_limit(spec)
+    return None if found is None else f"{found}: queues will grow"
+
+
+def _above_limit(spec: RunSpec) -> str | None:
+    """How many arrive and how many the lane carries, None where these are no fewer.
 
     Arrivals that are listed one by one have no flow. Of flows that change the most counts.
     """
@@ -27,17 +33,20 @@ def demand_above_limit(spec: RunSpec) -> str | None:
     if demand_veh_h <= limit_veh_h:
         return None
     return (
-        f"{demand_veh_h:,.0f} veh/h is above this lane's {limit_veh_h:,.0f}"
-        f"{_gaps(scenario.safety)}: queues will grow"
+        f"{demand_veh_h:,.0f} veh/h arrive, and the lane carries {limit_veh_h:,.0f} at most"
+        f"{_gaps(scenario.safety)}"
     )
 
 
 def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
     """Returns in a line how many of a study's runs have flows above their lane's limit, or None."""
-    told = [line for spec in specs if (line := demand_above_limit(spec)) is not None]
+    told = [line for spec in specs if (line := _above_limit(spec)) is not None]
     if not told:
         return None
-    return f"{len(told)} of {len(specs)} runs are above what their lane carries; such as {told[0]}"
+    return (
+        f"in {len(told)} of {len(specs)} runs more vehicles arrive than one lane can carry, so "
+        f"that queues grow; in the first of them {told[0]}"
+    )
 
 
 def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:

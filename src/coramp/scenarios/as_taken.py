@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from coramp.scenarios.checks import decision_station_range_m
-from coramp.scenarios.defaults import populations
+from coramp.scenarios.defaults import ENTRY_RATIOS, LIMIT_RATIO, populations
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import KMH_PER_MPS, data_in_mps
@@ -13,7 +13,24 @@ from coramp.scenarios.toml_files import override_text, read
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
 TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation")
-CHOSEN, DEFAULT = "chosen to suit the rest", "default"
+FOLLOWS, DEFAULT = "follows from", "default"
+SOURCES = {
+    "ramp.stop_station_m": "the speeds and the acceleration lane",
+    "ramp.detector_station_m": "acceleration_lane_m",
+    "ramp.signal_station_m": "start_m",
+    "motion.slow_deviation": "speed_deviation, the gaps and the mainline's speed",
+    **{f"{s}.limit_mps": f"speed_mps ({ratio:g} times)" for s, ratio in LIMIT_RATIO.items()},
+    **{
+        f"{s}.entry_speed_mps": f"speed_mps ({low:g} to {high:g} times) and limit_mps"
+        for s, (low, high) in ENTRY_RATIOS.items()
+    },
+}
+"""Of keys that follow from others: from which."""
+HEAD = (
+    "# {name} as coramp takes it. A line without a comment is given in the file;",
+    "# a default is a constant of coramp. A line that begins with # follows from others:",
+    "# left out of a file it changes with them, written in it it stays.",
+)
 
 
 class Taken(NamedTuple):
@@ -44,32 +61,37 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
                 why = None
             elif table == "ramp" and key in STATIONS:
                 value, why = getattr(scenario, key), _why_there(scenario, key)
-            elif table == "motion" and key == "slow_deviation":
-                value, why = scenario.slow_deviation, CHOSEN
+            elif f"{table}.{key}" == "motion.slow_deviation":
+                value, why = scenario.slow_deviation, _from(f"{table}.{key}")
             elif value is None:
                 continue
             elif key == "flow_veh_h":
                 why = "of the list of arrivals"
             else:
-                why = CHOSEN if field.is_required() else DEFAULT
+                why = _from(f"{table}.{key}") if field.is_required() else DEFAULT
             yield Taken(f"{table}.{key}", value, why)
 
 
 def _why_there(scenario: Scenario, key: str) -> str:
     if key != "decision_station_m":
-        return CHOSEN
+        return _from(f"ramp.{key}")
     first_m, last_m = decision_station_range_m(scenario)
-    return f"{CHOSEN}: possible is {first_m:.1f} to {last_m:.1f}"
+    return f"{FOLLOWS} the range that is possible, {first_m:.1f} to {last_m:.1f}"
+
+
+def _from(key: str) -> str:
+    return f"{FOLLOWS} {SOURCES[key]}"
 
 
 def as_toml(name: str) -> str:
     """Returns a scenario of one's own with all that was chosen for it, as TOML with comments.
 
+    What follows from other keys stands in comments, so that it still does in a copy.
     Populations of drivers that every scenario has are named only, and so are listed arrivals.
     """
     scenario, keys = taken(name)
     lines = [
-        f"# {name} as coramp takes it. What the file leaves out says why it is as it is.",
+        *(line.format(name=name) for line in HEAD),
         f"name = {_text(scenario.name)}",
     ]
     if scenario.description:
@@ -81,7 +103,8 @@ def as_toml(name: str) -> str:
             table = here
             lines += ["", f"[{table}]"]
         notes = [note for note in (_in_kmh(plain, value), why) if note]
-        commented = "# " if plain == "flow_veh_h" and scenario.arrivals else ""
+        follows = why is not None and why.startswith(FOLLOWS)
+        commented = "# " if follows or (plain == "flow_veh_h" and scenario.arrivals) else ""
         comment = f"  # {', '.join(notes)}" if notes else ""
         lines.append(f"{commented}{plain} = {_text(value)}{comment}")
     common = [n for n in scenario.drivers if n in populations()]

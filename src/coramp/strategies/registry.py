@@ -24,6 +24,11 @@ from coramp.strategies.virtual_platoon import VirtualPlatoon
 GROUP = "coramp.strategies"
 OURS = "coramp"
 _STRATEGIES: dict[str, type[Strategy]] = {}
+DRIVERS_ALONE = frozenset(
+    {"driver", "drivers", "human", "humans", "sumo", "none", "nothing", "no-control", "baseline"}
+    | {"paper", "fair", "credible"}
+)
+"""What drivers whom nobody controls are also called, populations of them included."""
 
 
 def register(strategy: type[Strategy], *, replace: bool = False) -> None:
@@ -95,7 +100,14 @@ def strategy_named(name: str) -> type[Strategy]:
         return found
     if told:
         raise CorampError(told)
-    raise CorampError(f"strategy: there is no {name!r}; allowed are {', '.join(strategies())}")
+    hint = (
+        f"; drivers whom nobody controls are {Uncontrolled.name!r}"
+        if name.lower() in DRIVERS_ALONE
+        else ""
+    )
+    raise CorampError(
+        f"strategy: there is no {name!r}; allowed are {', '.join(strategies())}{hint}"
+    )
 
 
 @cache

@@ -137,6 +137,11 @@ class Study(Model):
         return self
 
     @property
+    def file(self) -> str | None:
+        """The built-in name or the file that it was read from, None where there is none."""
+        return self._file
+
+    @property
     def source(self) -> str:
         """The scenario as ``load_scenario`` takes it, from whatever folder."""
         return self.scenario if self._file is None else beside(self._file, self.scenario)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import polars as pl
 
+from coramp.studies.metric_labels import label_of
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
 
@@ -15,31 +16,35 @@ FLOW = ["mainline_veh_h", "ramp_veh_h"]
 
 
 class Metric(NamedTuple):
-    """A figure of a run: its title, unit included, its column, what is good, its digits."""
+    """A figure of a run: its column, what is good, its digits."""
 
-    title: str
     column: str
     high_is_good: bool = False
     digits: int = 2
 
+    @property
+    def title(self) -> str:
+        """Its name, unit included."""
+        return label_of(self.column)
+
 
 METRICS = (
-    Metric("mainline delay (s)", "mainline_delay_s"),
-    Metric("ramp delay (s)", "ramp_delay_s"),
-    Metric("delay of all (s)", "delay_s"),
-    Metric("mainline speed (m/s)", "mainline_speed_mps", True),
-    Metric("ramp speed (m/s)", "ramp_speed_mps", True),
-    Metric("fluctuation of mainline speed (m/s)", "mainline_speed_std_mps"),
-    Metric("fluctuation of ramp speed (m/s)", "ramp_speed_std_mps"),
-    Metric("fuel (ml/vehicle)", "fuel_ml"),
-    Metric("hardest braking (m/s2)", "max_decel_mps2"),
-    Metric("jerk (m/s3)", "max_jerk_mps3"),
-    Metric("smallest margin (m)", "min_margin_m", True),
-    Metric("TTC (s)", "min_ttc_s", True),
-    Metric("DRAC (m/s2)", "max_drac_mps2"),
-    Metric("unserved", "unserved", digits=1),
-    Metric("interventions", "interventions", digits=1),
-    Metric("planning (ms)", "planning_ms", digits=3),
+    Metric("mainline_delay_s"),
+    Metric("ramp_delay_s"),
+    Metric("delay_s"),
+    Metric("mainline_speed_mps", True),
+    Metric("ramp_speed_mps", True),
+    Metric("mainline_speed_std_mps"),
+    Metric("ramp_speed_std_mps"),
+    Metric("fuel_ml"),
+    Metric("max_decel_mps2"),
+    Metric("max_jerk_mps3"),
+    Metric("min_margin_m", True),
+    Metric("min_ttc_s", True),
+    Metric("max_drac_mps2"),
+    Metric("unserved", digits=1),
+    Metric("interventions", digits=1),
+    Metric("planning_ms", digits=3),
 )
 DELAY, FUEL = "delay_s", "fuel_ml"
 

@@ -21,7 +21,8 @@ class Outlook:
 
     ``searches_at_most`` counts the runs that searches for a breakdown may add; which ones they
     are, and how many, follows from the results. ``expected_s`` is for the runs to do, on ``jobs``
-    processes.
+    processes, without compiling: what a strategy's first run on a machine takes more. ``outdated``
+    counts runs that are kept of the scenario as it was before its file was changed.
     """
 
     folder: Path
@@ -32,6 +33,7 @@ class Outlook:
     searches_at_most: int
     jobs: int
     expected_s: float
+    outdated: int = 0
 
     @property
     def missing(self) -> int:
@@ -79,7 +81,11 @@ def outlook_of(
     per_vehicle_s = {**SECONDS_PER_VEHICLE, **{kind: median(s) for kind, s in seen.items()}}
     expected_s = sum(per_vehicle_s[_kind(s)] * _vehicles(s) for s in (*missing, *likely)) / jobs
     runs = done + len(missing)
-    return Outlook(folder, runs, done, len(failed), len(damaged), len(likely), jobs, expected_s)
+    changed = store is not None and store.scenario_changed
+    asked = (*specs, *(spec for taken, _ in walks for spec in taken))
+    outdated = store.count_of_others(asked) if store is not None and changed else 0
+    counts = (runs, done, len(failed), len(damaged), len(likely), jobs)
+    return Outlook(folder, *counts, expected_s, outdated)
 
 
 def _kind(spec: RunSpec) -> tuple[str, bool]:

@@ -5,14 +5,15 @@ same vehicles. So the interval of the difference says more than those of the two
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import polars as pl
 
 from coramp.studies.overrides import overrides_of
+from coramp.studies.setting_words import settings_text
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, with_interval
 
@@ -29,12 +30,32 @@ EVERY_PAIR_OF = 3
 """Of more strategies, or settings, only the pairs with the one that loses least are told."""
 
 
+MEANS = (
+    "Means over seeds of the difference on the same arrivals, with 95 % intervals; sure: the "
+    "interval of all leaves out zero."
+)
+POPULATIONS = (
+    "A baseline is named with its population of drivers; two populations are not compared with "
+    "each other, since they differ in who drives."
+)
+
+
 class Cell(NamedTuple):
-    """What was run with several seeds at one flow: who decides, and what was set."""
+    """What was run with several seeds at one flow: who decides, and what was set.
+
+    ``overrides`` are settings as the row has them, ``setting`` is the same in words.
+    """
 
     strategy: str
     drivers: str | None
     overrides: str | None
+    setting: str = ""
+
+    @classmethod
+    def of_run(cls, run: Mapping[str, Any]) -> Self:
+        """Returns the cell that a row of ``runs.parquet`` belongs to."""
+        setting = settings_text(overrides_of(run))
+        return cls(run["strategy"], run["drivers"], run["overrides"], setting)
 
     @property
     def who(self) -> tuple[str, str | None]:
@@ -44,8 +65,8 @@ class Cell(NamedTuple):
     @property
     def name(self) -> str:
         """Strategy, drivers and settings in words."""
-        who = f"{self.strategy} ({self.drivers})" if self.drivers else self.strategy
-        return f"{who}, {self.overrides}" if self.overrides else who
+        who = f"{self.strategy} ({self.drivers} drivers)" if self.drivers else self.strategy
+        return f"{who}, {self.setting}" if self.setting else who
 
 
 class Difference(NamedTuple):
@@ -74,8 +95,9 @@ Delays = Mapping[Cell, Mapping[int, tuple[float | None, ...]]]
 def differences(good: pl.DataFrame) -> list[Difference]:
     """Returns the difference of every two cells with the same arrivals that differ in one thing.
 
-    That is the strategy (or its drivers), or what is set and says nothing of arrivals. Cells that
-    lose the same with every seed are left out, and so is what fewer than two seeds share.
+    That is the strategy, or what is set and says nothing of arrivals. Cells of two populations of
+    drivers are never compared: they differ in who drives, not in what is done. Cells that lose the
+    same with every seed are left out, and so is what fewer than two seeds share.
     """
     return [
         difference
@@ -91,10 +113,18 @@ def _pairs(cells: Delays) -> Iterator[tuple[Cell, Cell]]:
         groups: dict[Any, list[Cell]] = {}
         for cell in cells:
             groups.setdefault(fixed(cell), []).append(cell)
-        for group in groups.values():
-            best = min(group, key=lambda cell: _mean(cells[cell]))
-            few = len(group) <= EVERY_PAIR_OF
-            yield from (pair for pair in combinations(group, 2) if few or best in pair)
+        found = (pair for group in groups.values() for pair in _pairs_of(group, cells))
+        yield from dict.fromkeys(found)
+
+
+def _pairs_of(group: Sequence[Cell], cells: Delays) -> Iterator[tuple[Cell, Cell]]:
+    """Of each population of drivers in a group the pairs with it and without drivers."""
+    populations = dict.fromkeys(cell.drivers for cell in group if cell.drivers is not None)
+    for population in populations or (None,):
+        alike = [cell for cell in group if cell.drivers in (None, population)]
+        best = min(alike, key=lambda cell: _mean(cells[cell]))
+        few = len(alike) <= EVERY_PAIR_OF
+        yield from (pair for pair in combinations(alike, 2) if few or best in pair)
 
 
 def _by_arrivals(
@@ -104,7 +134,7 @@ def _by_arrivals(
     for row in good.iter_rows(named=True):
         arrivals = {k: v for k, v in overrides_of(row).items() if not _says_nothing_of_arrivals(k)}
         flow = row["mainline_veh_h"], row["ramp_veh_h"]
-        cell = Cell(row["strategy"], row["drivers"], row["overrides"])
+        cell = Cell.of_run(row)
         by_seed = groups.setdefault((row["scenario"], flow, str(arrivals)), {}).setdefault(cell, {})
         by_seed[row["seed"]] = tuple(row[name] for name in DELAYS)
     return groups
@@ -178,9 +208,9 @@ def paired_table(good: pl.DataFrame) -> Table | None:
         "sure",
         "seeds",
     )
-    note = (
-        "Means over seeds of the difference on the same arrivals, with 95 % intervals; sure: the "
-        "interval of all leaves out zero."
+    notes = (
+        MEANS,
+        *([POPULATIONS] if any(d.less.drivers or d.more.drivers for d in found) else []),
     )
     important = ("loses less", "than", "by, all (s)", "sure", "flow (veh/h)")
-    return Table("Differences on the same arrivals", columns, rows, (note,), important)
+    return Table("Differences on the same arrivals", columns, rows, notes, important)

@@ -27,6 +27,7 @@ from coramp.records.unfinished import is_unfinished
 from coramp.runs.running import RunSpec, versions
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.definition import Study
+from coramp.studies.own_files import own_files
 
 ROWS_AT_A_TIME = 1000
 """Runs that are held in memory as rows while the tables are made."""
@@ -62,6 +63,7 @@ class Store:
         Raises CorampError where it holds another study, a run or foreign files.
         """
         self.folder = folder
+        self._study = study
         self._claim(study)
         made_folder(folder / PARTS)
 
@@ -95,7 +97,7 @@ class Store:
                 f"{self.folder}: holds other files and no study; give another or an empty folder"
             )
         made_folder(self.folder)
-        write_json(mark, {**content, "scenario": _scenario_of(study)})
+        write_json(mark, {**content, **_asked(study)})
 
     def _is_ours(self) -> bool:
         """Whether all in the folder is a study's; tables alone may be somebody else's."""
@@ -173,6 +175,31 @@ class Store:
         write_parquet(self.folder / "runs.parquet", runs)
         write_parquet(self.folder / "streams.parquet", streams)
         write_text(self.folder / "tables.md", markdown)
+        found = self._description() or {}
+        asked = {**found, **_plain(_asked(self._study))}
+        if asked != found:  # the tables are of the files as they are now
+            write_json(self.folder / MARK, asked)
+
+    @property
+    def scenario_changed(self) -> bool:
+        """Whether the scenario is another by now than that of the tables in the folder."""
+        found = self._description() or {}
+        return "scenario" in found and found["scenario"] != _plain(_scenario_of(self._study))
+
+    def count_of_others(self, specs: Iterable[RunSpec]) -> int:
+        """Returns how many runs are kept that are none of the given ones."""
+        asked = {spec.run_id for spec in specs}
+        return sum(p.stem not in asked for p in (self.folder / PARTS).glob("*.json"))
+
+
+def _asked(study: Study) -> Row:
+    """The scenario, and the files of one's own that ask for it, as they are now."""
+    return {"scenario": _scenario_of(study), "files": own_files(study)}
+
+
+def _plain(data: Any) -> Any:
+    """Data as it is read back from JSON."""
+    return json.loads(json.dumps(data))
 
 
 def _scenario_of(study: Study) -> Row | None:

@@ -11,9 +11,12 @@ from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
 from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.field_layout import field_tables
+from coramp.studies.metric_labels import LABELS, SPEED, label_of
+from coramp.studies.overrides import overrides_of
 from coramp.studies.paired import paired_table
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
+from coramp.studies.setting_words import settings_text
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
@@ -27,15 +30,14 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "drivers": drivers_tables,
     "worth": worth_tables,
 }
+MEANS = (
+    *("delay_s", "delay_bound_s", "mainline_delay_s", "ramp_delay_s"),
+    *("mainline_speed_mps", "ramp_speed_mps", "fuel_l"),
+)
+"""What the overview has the mean over seeds of, with its interval."""
 IMPORTANT = (
-    "scenario",
-    "strategy",
-    "flow (veh/h)",
-    "delay of all (s)",
-    "mainline delay (s)",
-    "ramp delay (s)",
-    "unserved",
-    "runs",
+    *("strategy", "setting", "flow (veh/h)", label_of("delay_s"), label_of("mainline_delay_s")),
+    *(label_of("ramp_delay_s"), label_of("unserved"), "runs"),
 )
 """Columns of the overview that a narrow terminal keeps first."""
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
@@ -57,42 +59,30 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
     """Returns one row a group of runs that differ only by their seed; speeds in a unit."""
     rows = []
     for key, group in good.group_by(GROUP, maintain_order=True):
-        scenario, overrides, drivers, strategy, engine, mainline, ramp = key
+        scenario, _, drivers, strategy, engine, mainline, ramp = key
+        means = (
+            with_interval(_in(unit if LABELS[column].unit == SPEED else MPS, of(group, column)))
+            for column in MEANS
+        )
         rows.append(
             (
-                " ".join(str(part) for part in (scenario, overrides) if part),
                 f"{strategy} ({drivers})" if drivers else str(strategy),
-                str(engine),
+                settings_text(overrides_of(group.row(0, named=True))) or "as in the scenario",
                 f"{mainline:g} + {ramp:g}",
-                str(group.height),
-                with_interval(of(group, "delay_s")),
-                with_interval(of(group, "delay_bound_s")),
-                with_interval(of(group, "mainline_delay_s")),
-                with_interval(of(group, "ramp_delay_s")),
-                with_interval(_in(unit, of(group, "mainline_speed_mps"))),
-                with_interval(_in(unit, of(group, "ramp_speed_mps"))),
-                with_interval(of(group, "fuel_l")),
+                *means,
                 str(group["unserved"].sum()),
                 number(smallest(group["min_ttc_s"])),
                 number(largest(group["max_decel_mps2"])),
+                str(group.height),
+                str(engine),
+                str(scenario),
             )
         )
     columns = (
-        "scenario",
-        "strategy",
-        "engine",
-        "flow (veh/h)",
-        "runs",
-        "delay of all (s)",
-        "least the lane allows (s)",
-        "mainline delay (s)",
-        "ramp delay (s)",
-        f"mainline speed ({unit.name})",
-        f"ramp speed ({unit.name})",
-        "fuel (l)",
-        "unserved",
-        "min TTC (s)",
-        "hardest braking (m/s2)",
+        *("strategy", "setting", "flow (veh/h)"),
+        *(label_of(column, unit) for column in MEANS),
+        *(label_of(column) for column in ("unserved", "min_ttc_s", "max_decel_mps2")),
+        *("runs", "engine", "scenario"),
     )
     notes = (
         "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle.",
@@ -114,9 +104,9 @@ def promises(runs: pl.DataFrame) -> Table:
         ("cooperative runs", str(cooperative.height)),
         ("runs that broke a promise", str(broken)),
         ("collisions in SUMO", str(cooperative["collisions"].sum())),
-        ("safe-distance violations", str(cooperative["safety_violations"].sum())),
-        ("smallest margin over the safe distance (m)", number(margin_m, 3)),
-        ("largest difference between plan and SUMO (m)", number(error_m, 4)),
+        (label_of("safety_violations"), str(cooperative["safety_violations"].sum())),
+        (label_of("min_margin_m"), number(margin_m, 3)),
+        (label_of("plan_error_m"), number(error_m, 4)),
         ("vehicles unserved", str(cooperative["unserved"].sum())),
         ("failed runs", str(runs.filter(status="failed").height)),
     )

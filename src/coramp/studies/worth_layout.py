@@ -5,6 +5,7 @@ from typing import Any
 import polars as pl
 
 from coramp.studies.capacity_layout import gaps_in_words
+from coramp.studies.metric_labels import label_of
 from coramp.studies.overrides import overrides_of, setting_of
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import Table, number, with_interval
@@ -48,12 +49,10 @@ def worth_tables(good: pl.DataFrame) -> list[Table]:
 
 
 FIGURES = (
-    "mainline delay (s)",
-    "ramp delay (s)",
-    "fuel (l)",
+    *(label_of(column) for column in ("mainline_delay_s", "ramp_delay_s", "fuel_l")),
     "brakings beyond 3, 4.5 m/s2",
     "stopped",
-    "smallest TTC (s)",
+    label_of("min_ttc_s"),
     "collisions",
     "unserved",
 )

@@ -10,9 +10,21 @@ from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
 from coramp.runs.running import broken_promises
-from coramp.strategies.situation import RUNGS
+from coramp.studies.metric_labels import LABELS, RUNG_COLUMNS, in_unit, label_of, typeset
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
+
+SHOWN = (
+    *("delay_s", "delay_bound_s", "delay_bound_ratio"),
+    *("mainline_delay_s", "mainline_delay_p95_s", "ramp_delay_s", "ramp_delay_p95_s"),
+    *("mainline_speed_mps", "ramp_speed_mps", "mainline_fcfs_delay_s", "ramp_fcfs_delay_s"),
+    *("lane_limit_veh_h", "fuel_l", "vehicles_mainline", "vehicles_ramp", "unserved"),
+    *("collisions", "safety_violations", "min_margin_m", "min_margin_equation"),
+    *("min_merge_margin_m", "min_ttc_s", "max_decel_mps2", "hard_brakings_3"),
+    *("hard_brakings_4_5", "stops", "plan_error_m", *RUNG_COLUMNS.values()),
+)
+"""The figures of a run that its page has, in order."""
+MEANS = "Delays and speeds are means over vehicles, but for percentiles."
 
 
 def replay_page(runs: Sequence[RunRecords]) -> str:
@@ -45,6 +57,7 @@ def run_page(
         sure=_how_sure(runs),
         versions=Table("Versions", ("what", "version"), tuple(map(_texts, versions.items()))),
         repeat="\n".join(repeat),
+        files={},
     )
 
 
@@ -111,7 +124,7 @@ def asked_table(run: RunRecords, unit: SpeedUnit = MPS) -> Table:
         ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
         ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
     )
-    return Table("What was computed", ("what", "value"), rows)
+    return Table("Road, traffic and errors of this run", ("what", "value"), rows)
 
 
 def _arrivals(run: RunRecords) -> str:
@@ -185,46 +198,16 @@ def notes(run: RunRecords) -> list[str]:
 
 def comparison_table(runs: Sequence[RunRecords], unit: SpeedUnit = MPS) -> Table:
     """Returns the figures of runs side by side; speeds in a unit."""
-    lines: list[tuple[str, str, int]] = [
-        ("delay of all, mean (s)", "delay_s", 2),
-        ("least delay that the lane allows, of all (s)", "delay_bound_s", 2),
-        ("delay over the least that the lane allows", "delay_bound_ratio", 2),
-        ("mainline delay, mean (s)", "mainline_delay_s", 2),
-        ("mainline delay, 95th percentile (s)", "mainline_delay_p95_s", 2),
-        ("ramp delay, mean (s)", "ramp_delay_s", 2),
-        ("ramp delay, 95th percentile (s)", "ramp_delay_p95_s", 2),
-        (f"mainline speed, mean ({unit.name})", "mainline_speed_mps", 2),
-        (f"ramp speed, mean ({unit.name})", "ramp_speed_mps", 2),
-        ("mainline delay, first come first served (s)", "mainline_fcfs_delay_s", 2),
-        ("ramp delay, first come first served (s)", "ramp_fcfs_delay_s", 2),
-        ("most that the lane carries (veh/h)", "lane_limit_veh_h", 0),
-        ("fuel (l)", "fuel_l", 2),
-        ("mainline vehicles", "vehicles_mainline", 0),
-        ("ramp vehicles", "vehicles_ramp", 0),
-        ("not served", "unserved", 0),
-        ("collisions", "collisions", 0),
-        ("pairs nearer than the safe distance", "safety_violations", 0),
-        ("smallest margin over the safe distance (m)", "min_margin_m", 3),
-        ("the same, over which equation", "min_margin_equation", 0),
-        ("smallest margin over Eq. 15, 16 at lane changes (m)", "min_merge_margin_m", 3),
-        ("smallest time to collision (s)", "min_ttc_s", 2),
-        ("hardest braking (m/s²)", "max_decel_mps2", 2),
-        ("brakings beyond 3 m/s²", "hard_brakings_3", 0),
-        ("brakings beyond 4.5 m/s²", "hard_brakings_4_5", 0),
-        ("vehicles that stopped on their way", "stops", 0),
-        ("largest difference between plan and SUMO (m)", "plan_error_m", 4),
-        *((f"ramp vehicles by rung {rung}", f"rung_{rung}", 0) for rung in RUNGS),
-    ]
     rows = tuple(
-        (text, *(number(_shown(_computed(run, key), key, unit), digits) for run in runs))
-        for text, key, digits in lines
+        (
+            typeset(label_of(key, unit)),
+            *(number(in_unit(_computed(r, key), key, unit), LABELS[key].digits) for r in runs),
+        )
+        for key in SHOWN
         if any(_computed(run, key) is not None for run in runs)
     )
-    return Table("Figures", ("what", *(title_of(run) for run in runs)), rows)
-
-
-def _shown(value: float | None, key: str, unit: SpeedUnit) -> float | None:
-    return unit.of(value) if key.endswith("_speed_mps") else value
+    columns = ("what", *(title_of(run) for run in runs))
+    return Table("Figures", columns, rows, (MEANS,))
 
 
 def _computed(run: RunRecords, key: str) -> Any:

@@ -1,74 +1,131 @@
-"""What a study of one's own says, in sentences: who loses least, by how much, and how sure."""
+"""What a study says first: by setting who loses how much, and by how much the best is better."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import polars as pl
 
 from coramp.report.style import look_of
-from coramp.scenarios.toml_files import override_text
 from coramp.studies.overrides import overrides_of, scenario_value
 from coramp.studies.paired import Cell, Difference, differences
-from coramp.studies.shown import shared_flows
+from coramp.studies.setting_words import gaps_text, settings_text
+from coramp.studies.shown import SHOWN_DRIVERS, plain, shared_flows
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import with_interval
 
-MOST_SETTINGS = 4
+MOST_SETTINGS = 6
 
 
-def own_answer(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) -> str:
-    """Returns for each setting who loses least and by how much, at the highest flow of all.
+class Answer(NamedTuple):
+    """A line that says what is told, and an item each with its label, which may be empty."""
 
-    Differences are those on the same arrivals. ``scenario`` is the content of the study's scenario:
-    where a run sets nothing, its values are told of what others set.
+    lead: str
+    items: tuple[tuple[str, str], ...]
+    rest: str = ""
+
+
+def own_answer(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) -> Answer:
+    """Returns for each setting what each loses and by how much the best is better.
+
+    At the highest flow that most strategies share. Differences are those on the same arrivals.
+    ``scenario`` is the content of the study's scenario: where a run sets nothing, its values are
+    told of what others set.
     """
     mainline, ramp = shared_flows(good)[-1]
     at = good.filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
     apart = {(d.less, d.more): d for d in differences(at)}
     settings = at["overrides"].unique(maintain_order=True).to_list()
-    own = _own_setting(at, scenario or {})
-    told = [_sentence(at, setting, own, apart) for setting in settings[:MOST_SETTINGS]]
-    more = len(settings) - len(told)
-    rest = f" {more} more settings are in the tables." if more > 0 else ""
-    return f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals: {' '.join(told)}{rest}"
+    items = tuple(
+        (_label_of_setting(at, setting, scenario or {}), _item(at, setting, apart, scenario or {}))
+        for setting in settings[:MOST_SETTINGS]
+    )
+    more = len(settings) - len(items)
+    rest = f"{more} more settings are in the tables." if more > 0 else ""
+    return Answer(_lead(at, mainline, ramp), items, rest)
 
 
-def _own_setting(at: pl.DataFrame, scenario: Mapping[str, Any]) -> str:
-    """What the scenario itself has of all that other runs set, as ``KEY=VALUE``."""
+def _lead(at: pl.DataFrame, mainline: float, ramp: float) -> str:
+    seeds = at["seed"].n_unique()
+    means = f"mean over {seeds} seeds ± 95 % interval" if seeds > 1 else "one seed, no interval"
+    return f"At {mainline:g} + {ramp:g} veh/h, seconds that a vehicle loses ({means}):"
+
+
+def _label_of_setting(at: pl.DataFrame, setting: str | None, scenario: Mapping[str, Any]) -> str:
+    """A setting in words; of what this one does not set and others do, the scenario's own."""
+    rows = at.filter(pl.col("overrides").eq_missing(pl.lit(setting, pl.String)))
+    here = overrides_of(rows.row(0, named=True))
     keys = sorted({key for row in at.iter_rows(named=True) for key in overrides_of(row)})
-    own = {key: scenario_value(scenario, key) for key in keys}
-    return ", ".join(override_text(key, value) for key, value in own.items() if value is not None)
+    values = {key: here.get(key, scenario_value(scenario, key)) for key in keys}
+    known = {key: value for key, value in values.items() if value is not None}
+    return settings_text(known, scenario) or ("as in the scenario" if keys else "")
 
 
-def _sentence(
+def _item(
     at: pl.DataFrame,
     setting: str | None,
-    own: str,
-    apart: dict[tuple[Cell, Cell], Difference],
+    apart: Mapping[tuple[Cell, Cell], Difference],
+    scenario: Mapping[str, Any],
 ) -> str:
-    """One setting: the cell with the least mean delay of all, then the others after it."""
+    """What each cell of a setting loses, the best first, with its lead over the others."""
     delays_s = dict(_cells(at, setting))
-    best, *others = sorted(delays_s, key=lambda cell: estimate(delays_s[cell]).mean)
-    named = setting or own
-    where = f"with {named} " if named else ""
-    parts = [f"{_label(best)} loses least, {with_interval(estimate(delays_s[best]))} s a vehicle"]
-    for cell in others:
-        found = apart.get((best, cell))
-        if found is not None:
-            sure = "" if found.told_apart else ", which may be chance"
-            parts.append(f"{_label(cell)} {with_interval(found.by_s[0])} s more{sure}")
-        else:
-            parts.append(f"{_label(cell)} {with_interval(estimate(delays_s[cell]))} s")
-    text = f"{where}{'; '.join(parts)}."
-    return text[0].upper() + text[1:]
+    ordered = sorted(delays_s, key=lambda cell: estimate(delays_s[cell]).mean)
+    best = ordered[0]
+    told = [
+        f"{_label(cell, scenario)} {with_interval(estimate(delays_s[cell]))} s" for cell in ordered
+    ]
+    ahead = [
+        f"by {with_interval(found.by_s[0])} s over {_label(cell)}"
+        + ("" if found.told_apart else " (may be chance)")
+        for cell in ordered[1:]
+        if (found := apart.get((best, cell))) is not None
+    ]
+    lead = f" {_label(best).capitalize()} is best {', '.join(ahead)}." if ahead else ""
+    return f"{', '.join(told)}.{lead}"
 
 
 def _cells(at: pl.DataFrame, setting: str | None) -> Iterator[tuple[Cell, list[float]]]:
     here = at.filter(pl.col("overrides").eq_missing(pl.lit(setting, pl.String)))
-    for (strategy, drivers), group in here.group_by(["strategy", "drivers"], maintain_order=True):
-        cell = Cell(str(strategy), None if drivers is None else str(drivers), setting)
-        yield cell, group["delay_s"].drop_nulls().to_list()
+    for _, group in here.group_by(["strategy", "drivers"], maintain_order=True):
+        yield Cell.of_run(group.row(0, named=True)), group["delay_s"].drop_nulls().to_list()
 
 
-def _label(cell: Cell) -> str:
-    return look_of(*cell.who).label
+def _label(cell: Cell, scenario: Mapping[str, Any] | None = None) -> str:
+    """What a cell is called, drivers with the gaps of their population if these are known."""
+    label = look_of(*cell.who).label
+    population = scenario_value(scenario or {}, f"drivers.{cell.drivers}") if cell.drivers else None
+    if not isinstance(population, Mapping):
+        return label
+    time_gaps_s, gap_m = population.get("tau_s"), population.get("min_gap_m")
+    if isinstance(time_gaps_s, list):
+        low, high = min(time_gaps_s), max(time_gaps_s)
+        return f"{label} (who keep {low:g} to {gaps_text(high, gap_m)})"
+    return f"{label} (who keep {gaps_text(time_gaps_s, gap_m)})"
+
+
+def layout_answer(good: pl.DataFrame) -> Answer:
+    """Returns what each strategy loses on mainline and ramp at the highest flow that all share.
+
+    Strategies with the same figures are named together.
+    """
+    mainline, ramp = shared_flows(good)[-1]
+    at = plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
+    main = at.filter(pl.col("drivers").is_null() | pl.col("drivers").is_in(SHOWN_DRIVERS))
+    at = main if main.height else at
+    losing: dict[tuple[str, ...], list[str]] = {}
+    for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
+        delays = tuple(
+            with_interval(estimate(group[f"{stream}_delay_s"].drop_nulls().to_list()))
+            for stream in ("mainline", "ramp")
+        )
+        name = look_of(str(strategy), str(drivers) if drivers else None).label
+        losing.setdefault(delays, []).append(name)
+    items = tuple(
+        (_listed(names), f"{mainline_s} s on the mainline, {ramp_s} s on the ramp")
+        for (mainline_s, ramp_s), names in losing.items()
+    )
+    return Answer(_lead(at, mainline, ramp), items)
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last

@@ -18,28 +18,24 @@ from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
-from coramp.report.page.study_answer import own_answer
+from coramp.report.page.study_answer import layout_answer, own_answer
+from coramp.report.page.study_repeat import another_setting, repeat_command, watched_text
 from coramp.report.page.svg import picture
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
-from coramp.report.style import look_of
 from coramp.report.varied_figure import readable, varied_figure
 from coramp.runs.beforehand import of_automation
-from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
-from coramp.studies.overrides import overrides_of
+from coramp.studies.overrides import overrides_of, scenario_value
+from coramp.studies.setting_words import GAPS, key_name
 from coramp.studies.shown import (
-    SHOWN_DRIVERS,
-    plain,
     read_shown,
     same_delays,
-    shared_flows,
     shown_rows,
 )
 from coramp.studies.speed_unit import MPS, SpeedUnit
-from coramp.studies.statistics import estimate
 from coramp.studies.summary import promises, summary_tables
-from coramp.studies.tables import Table, with_interval, without_same
+from coramp.studies.tables import Table, without_same
 
 DRAWN = {
     "paper": (
@@ -55,7 +51,8 @@ DRAWN = {
     ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
 }
-SHOWN_WITH = "Shown over time, and to be watched, are runs with"
+MOST_VALUES = 6
+"""Of a setting with more values the first and the last are told."""
 OWN = "Mean delay over what varies, with 95 % intervals over seeds"
 """The figure of a study whose layout has none of its own."""
 
@@ -73,6 +70,7 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         reason = f": {every['error'][0]}" if every.height else ""
         raise CorampError(f"{folder}: no run went well{reason}; start its coramp study again")
     by_flow, said = _shown(folder, good)
+    files = content.get("files") or {}
     cells, packs = _cells(by_flow)
     over_time = [row for runs in by_flow.values() for row in over_time_pictures(runs, unit)]
     return assembled(
@@ -80,22 +78,24 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         title=f"Report: study {study.name}",
         subtitle=study.description,
         asked=_asked(study, good, content, unit),
-        answer=own_answer(good, content["scenario"]) if study.layout == "plain" else _answer(good),
+        answer=(
+            own_answer(good, content["scenario"])
+            if study.layout == "plain"
+            else layout_answer(good)
+        ),
         notes=[*_notes(study, every, listed=_lists_arrivals(content)), *said],
         tables=[without_same(table) for table in summary_tables(study, every, unit)],
         pictures=[*pictures_of(study.layout, good, content["scenario"]), *over_time],
         failed=_failed(every),
         sure=_how_sure(good, listed=_lists_arrivals(content)),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
-        repeat=f"coramp study {_file_of(study)} --seeds {good['seed'].n_unique()}",
+        repeat=repeat_command(study, files, good["seed"].n_unique()),
+        files=files,
+        watched=watched_text(by_flow, good),
+        another=another_setting(study, good),
         runs=packs,
         cells=cells,
     )
-
-
-def _file_of(study: Study) -> str:
-    """The study as the command takes it; one of one's own is taken to lie in NAME.toml."""
-    return study.name if study.name in builtin_names("studies") else f"{study.name}.toml"
 
 
 def _lists_arrivals(content: Row) -> bool:
@@ -116,53 +116,34 @@ def _asked(study: Study, good: pl.DataFrame, content: Row, unit: SpeedUnit) -> T
         ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
-        *_road(content["scenario"], unit, study.horizon_s),
+        *_road(content["scenario"], unit, study.horizon_s, good),
     )
-    return Table("What was computed", ("what", "value"), rows)
+    return Table("Study, road and gaps", ("what", "value"), rows)
 
 
-def _road(scenario: Row, unit: SpeedUnit, horizon_s: float | None) -> list[tuple[str, str]]:
-    """The scenario's road and gaps, as far as runs do not set them."""
-    mainline, ramp, safety = (scenario[name] for name in ("mainline", "ramp", "safety"))
+def _road(
+    scenario: Row, unit: SpeedUnit, horizon_s: float | None, good: pl.DataFrame
+) -> list[tuple[str, str]]:
+    """The scenario's road and gaps; of what runs set, all values that they set."""
+    mainline, ramp = scenario["mainline"], scenario["ramp"]
     speeds = (unit.of(stream["speed_mps"]) for stream in (mainline, ramp))
+    every = [overrides_of(row) for row in good.iter_rows(named=True)]
+    keys = dict.fromkeys(key for found in every for key in found)
+    told = [
+        (key_name(key), _values([found.get(key, scenario_value(scenario, key)) for found in every]))
+        for key in dict.fromkeys(("ramp.acceleration_lane_m", *GAPS, *keys))
+    ]
     return [
         (f"speeds, mainline and ramp ({unit.name})", " and ".join(f"{v:.4g}" for v in speeds)),
-        ("acceleration lane (m)", f"{ramp['acceleration_lane_m']:g}"),
-        ("time gap (s)", f"{safety['time_gap_s']:g}"),
-        ("standstill gap (m)", f"{safety['standstill_gap_m']:g}"),
+        *told,
         ("horizon of a run (s)", f"{horizon_s or scenario['simulation']['horizon_s']:g}"),
     ]
 
 
-def _answer(good: pl.DataFrame) -> str:
-    """What each strategy loses at the highest flow that all share, in a sentence.
-
-    Strategies with the same figures are named together.
-    """
-    mainline, ramp = shared_flows(good)[-1]
-    at = plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
-    main = at.filter(pl.col("drivers").is_null() | pl.col("drivers").is_in(SHOWN_DRIVERS))
-    at = main if main.height else at
-    losing: dict[tuple[str, ...], list[str]] = {}
-    for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
-        delays = tuple(
-            with_interval(estimate(group[f"{stream}_delay_s"].drop_nulls().to_list()))
-            for stream in ("mainline", "ramp")
-        )
-        name = look_of(str(strategy), str(drivers) if drivers else None).label
-        losing.setdefault(delays, []).append(name)
-    parts = [
-        f"{mainline_s} s on the mainline and {ramp_s} s on the ramp with {_listed(names)}"
-        for (mainline_s, ramp_s), names in losing.items()
-    ]
-    return (
-        f"At {mainline:g} + {ramp:g} veh/h, on the same arrivals, vehicles lose {'; '.join(parts)}."
-    )
-
-
-def _listed(names: Sequence[str]) -> str:
-    *others, last = names
-    return f"{', '.join(others)} and {last}" if others else last
+def _values(found: Sequence[Any]) -> str:
+    texts = {f"{v:g}" if isinstance(v, float) else str(v): None for v in found}
+    shown = list(texts)
+    return ", ".join(shown) if len(shown) <= MOST_VALUES else f"{shown[0]} to {shown[-1]}"
 
 
 def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
@@ -177,8 +158,8 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
     keys = _without_effect(runs)
     if keys:
         yield (
-            f"{', '.join(keys)}: for coordinated vehicles only. Drivers drive the same with every "
-            "value; they keep tau_s and min_gap_m of their population."
+            f"{', '.join(map(key_name, keys))}: for coordinated vehicles only. Drivers drive the "
+            "same with every value; they keep the gaps of their population (tau_s, min_gap_m)."
         )
     failed = runs.filter(status="failed").height
     if failed:
@@ -255,8 +236,6 @@ def _shown(folder: Path, good: pl.DataFrame) -> tuple[dict[str, list[RunRecords]
                 f"{title_of(run)} at {run.flows} is not shown: its records have other delays than "
                 "the study"
             )
-        if row["overrides"] and (line := f"{SHOWN_WITH} {row['overrides']}.") not in said:
-            said.append(line)
     if not found and not said:
         said.append("The study has kept no runs to watch; start its coramp study again for them.")
     return found, said

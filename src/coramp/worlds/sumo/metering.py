@@ -15,7 +15,11 @@ that sees a queue too long for it: SUMO lets nobody in who could not stop behind
 at 16 m/s the last one stands some 80 m from the start and the others wait outside."""
 SIGNAL, RAMP_LANE = "stopline", "ramp_0"
 YELLOW_S = 2.0
-"""Between green and red; who cannot stop in comfort by then goes on."""
+"""Between green and red; who cannot stop in comfort goes on. A fast or heavy one is not past the
+line by then: yellow lasts until it is, as SUMO stops dead whom red leaves no way to stop."""
+GOES_ON = 1.25
+"""Who would have to brake harder than so many times its comfortable braking has decided to go on:
+one that stops at the line brakes with 1, up to the rounding of steps."""
 
 
 def loops(scenario: Scenario, period_s: float) -> str:
@@ -72,7 +76,10 @@ class Meter:
         return self.readings[-1]
 
     def obey(self, commands: Iterable[WorldCommand], step: int) -> None:
-        """Sets the signal at ``step``: yellow first where it is to be red."""
+        """Sets the signal at ``step``: yellow first where it is to be red.
+
+        Red waits for whom it would catch too near to the line to stop.
+        """
         time_s = step * self._step_s
         for signal in commands:
             if not isinstance(signal, SetSignal):
@@ -80,6 +87,6 @@ class Meter:
             self.signals.append(signal)
             self._session.set_signal(SIGNAL, RAMP_LANE, GREEN if signal.green else YELLOW)
             self._red_s = math.inf if signal.green else time_s + YELLOW_S
-        if time_s >= self._red_s:
+        if time_s >= self._red_s and self._session.stopping_effort(RAMP_LANE) <= GOES_ON:
             self._session.set_signal(SIGNAL, RAMP_LANE, RED)
             self._red_s = math.inf

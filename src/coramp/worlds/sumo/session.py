@@ -187,6 +187,17 @@ class Session:
         """Returns who is on a lane now."""
         return set(libsumo.lane.getLastStepVehicleIDs(lane))
 
+    def stopping_effort(self, lane: str) -> float:
+        """Returns how hard who drives on a lane would have to brake to stop at its end.
+
+        In units of that vehicle's own comfortable braking; the largest of all, 0 for none.
+        """
+        length_m = float(libsumo.lane.getLength(lane))
+        return max(
+            (_stopping_effort(name, length_m) for name in libsumo.lane.getLastStepVehicleIDs(lane)),
+            default=0.0,
+        )
+
     def act_now(self, vehicle_id: str) -> None:
         """Lets a vehicle act in the next step: it looks anew at the lanes before it."""
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
@@ -203,6 +214,16 @@ class Session:
             )
         except libsumo.TraCIException as error:
             raise CorampError(f"SUMO: {vehicle_id} is not on the road: {error}") from error
+
+
+def _stopping_effort(vehicle_id: str, at_m: float) -> float:
+    """v^2 / (2 d b), with d the way to a position on the vehicle's lane and b its braking."""
+    speed_mps = float(libsumo.vehicle.getSpeed(vehicle_id))
+    if speed_mps <= 0.0:
+        return 0.0
+    left_m = at_m - float(libsumo.vehicle.getLanePosition(vehicle_id))
+    braking_mps2 = float(libsumo.vehicle.getDecel(vehicle_id))
+    return speed_mps**2 / (2.0 * left_m * braking_mps2) if left_m > 0.0 else math.inf
 
 
 def _check_speed(vehicle_id: str, speed_mps: float) -> None:

@@ -32,8 +32,7 @@ coramp.Diagram = class {
     this.plot.over.addEventListener('dblclick', () => this.show(this.full.x, this.full.y));
     new ResizeObserver(() => this.resize()).observe(this.place);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.recolour());
-    const [from, to] = this.firstWindow();
-    this.show([from, to], this.full.y);
+    this.showAround(0);
   }
 
   tools() {
@@ -59,11 +58,10 @@ coramp.Diagram = class {
       element('label', {}, 'vehicle ', this.choice));
   }
 
-  firstWindow() {
-    const made = this.run.decisions.find((d) => d.adjusted.length)
-      ?? this.run.decisions.find((d) => d.rung !== 'hold');
-    const from = Math.max(0, Math.min((made?.time ?? 0) - 15, this.run.end_s - 90));
-    return [from, Math.min(from + 90, this.run.end_s)];
+  // A minute and a half around a time, as far as the run has so much.
+  showAround(time) {
+    const from = Math.max(0, Math.min(time - 30, this.run.end_s - 90));
+    this.show([from, Math.min(from + 90, this.run.end_s)], this.full.y);
   }
 
   options() {

@@ -26,6 +26,7 @@ coramp.Show = class {
     this.diagrams.forEach((diagram) => {
       const { x, y } = before?.window ?? {};
       if (before) diagram.show([x[0], Math.min(x[1], diagram.full.x[1])], y);
+      else diagram.showAround(this.replay.time);
     });
   }
 
@@ -53,7 +54,7 @@ coramp.Show = class {
 coramp.legend = () => {
   const { element } = coramp;
   const entries = { ramp: 'ramp vehicle, dot: its merge', moved: 'moves for another', mainline: 'mainline vehicle',
-    lane: 'stations of the acceleration lane', bad: 'nearer than the safe distance' };
+    lane: 'stations of the acceleration lane', bad: 'nearer than the safe distance', upright: 'time of the replay' };
   return element('ul', { class: 'legend' }, ...Object.entries(entries).map(([key, text]) =>
     element('li', {}, element('span', { class: `swatch ${key}`, 'aria-hidden': 'true' }), text)));
 };

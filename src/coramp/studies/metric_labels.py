@@ -1,0 +1,85 @@
+"""What the figures of a run are called in tables and pages: one name, unit and digits each."""
+
+from typing import NamedTuple
+
+from coramp.strategies.situation import RUNGS
+from coramp.studies.speed_unit import MPS, SpeedUnit
+
+SPEED = "speed"
+"""The unit of what is shown in the unit of speeds that was chosen."""
+POWERS = {"m/s2": "m/s²", "m/s3": "m/s³", "m2/s4": "m²/s⁴"}
+RUNG_COLUMNS = {rung: f"rung_{rung}" for rung in RUNGS}
+"""The columns that count the ramp vehicles of each rung."""
+
+
+class MetricLabel(NamedTuple):
+    """A figure's name, its unit ("" for none) and the digits that it is shown with."""
+
+    name: str
+    unit: str = ""
+    digits: int = 2
+
+
+LABELS: dict[str, MetricLabel] = {
+    "delay_s": MetricLabel("delay of all", "s"),
+    "delay_bound_s": MetricLabel("least delay that the lane allows", "s"),
+    "delay_bound_ratio": MetricLabel("delay over the least that the lane allows"),
+    "mainline_delay_s": MetricLabel("mainline delay", "s"),
+    "mainline_delay_p95_s": MetricLabel("mainline delay, 95th percentile", "s"),
+    "ramp_delay_s": MetricLabel("ramp delay", "s"),
+    "ramp_delay_p95_s": MetricLabel("ramp delay, 95th percentile", "s"),
+    "mainline_speed_mps": MetricLabel("mainline speed", SPEED),
+    "ramp_speed_mps": MetricLabel("ramp speed", SPEED),
+    "mainline_speed_std_mps": MetricLabel("fluctuation of mainline speed", SPEED),
+    "ramp_speed_std_mps": MetricLabel("fluctuation of ramp speed", SPEED),
+    "mainline_fcfs_delay_s": MetricLabel("mainline delay, first come first served", "s"),
+    "ramp_fcfs_delay_s": MetricLabel("ramp delay, first come first served", "s"),
+    "lane_limit_veh_h": MetricLabel("most that the lane carries", "veh/h", 0),
+    "fuel_l": MetricLabel("fuel", "l"),
+    "fuel_ml": MetricLabel("fuel", "ml/vehicle"),
+    "vehicles_mainline": MetricLabel("mainline vehicles", digits=0),
+    "vehicles_ramp": MetricLabel("ramp vehicles", digits=0),
+    "unserved": MetricLabel("unserved", digits=0),
+    "collisions": MetricLabel("collisions", digits=0),
+    "safety_violations": MetricLabel("safe-distance violations", digits=0),
+    "min_margin_m": MetricLabel("smallest margin over the safe distance", "m", 3),
+    "min_margin_equation": MetricLabel("the same, over which equation", digits=0),
+    "min_merge_margin_m": MetricLabel("smallest margin over Eq. 15, 16 at lane changes", "m", 3),
+    "min_ttc_s": MetricLabel("smallest TTC", "s"),
+    "max_drac_mps2": MetricLabel("largest DRAC", "m/s2"),
+    "max_severity": MetricLabel("largest severity J", "m2/s4"),
+    "max_decel_mps2": MetricLabel("hardest braking", "m/s2"),
+    "max_jerk_mps3": MetricLabel("jerk", "m/s3"),
+    "hard_brakings_3": MetricLabel("brakings beyond 3 m/s2", digits=0),
+    "hard_brakings_4_5": MetricLabel("brakings beyond 4.5 m/s2", digits=0),
+    "stops": MetricLabel("vehicles that stopped on their way", digits=0),
+    "plan_error_m": MetricLabel("largest difference between plan and SUMO", "m", 4),
+    "interventions": MetricLabel("unsafe commands that were replaced", digits=0),
+    "adjusted_vehicles": MetricLabel("vehicles adjusted for others", digits=0),
+    "planning_ms": MetricLabel("planning", "ms", 3),
+    "wall_s": MetricLabel("computed in", "s"),
+    **{
+        column: MetricLabel(f"ramp vehicles by rung {rung}", digits=0)
+        for rung, column in RUNG_COLUMNS.items()
+    },
+}
+"""By column of ``runs.parquet``, and of what studies derive from it."""
+
+
+def label_of(column: str, unit: SpeedUnit = MPS) -> str:
+    """Returns a figure's name with its unit, as headers have it; speeds in a unit."""
+    label = LABELS[column]
+    shown = unit.name if label.unit == SPEED else label.unit
+    return f"{label.name} ({shown})" if shown else label.name
+
+
+def in_unit(value: float | None, column: str, unit: SpeedUnit) -> float | None:
+    """Returns a figure as it is shown: speeds in a unit, all others as they are."""
+    return unit.of(value) if LABELS[column].unit == SPEED else value
+
+
+def typeset(text: str) -> str:
+    """Returns a text with powers in its units raised, as pages and figures have them."""
+    for plain, raised in POWERS.items():
+        text = text.replace(plain, raised)
+    return text
