@@ -7,7 +7,7 @@ import pytest
 from coramp.errors import CorampError
 from coramp.messages.commands import Enter, Follow, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
-from coramp.messages.kinds import KINDS, LOG_VERSION, MESSAGES
+from coramp.messages.kinds import COLUMNS, KINDS, LOG_VERSION
 from coramp.messages.log import NO_POSITIONS, Positions, Told, _row, as_frame
 from coramp.messages.log_reader import read_log
 from coramp.vehicles.traits import Traits
@@ -64,7 +64,7 @@ def refusal(frame, folder):
 def changed(frame, row, **values):
     columns = {
         name: pl.when(pl.int_range(pl.len()) == row)
-        .then(pl.lit(value, MESSAGES[name]))
+        .then(pl.lit(value, COLUMNS[name]))
         .otherwise(pl.col(name))
         for name, value in values.items()
     }
@@ -73,7 +73,7 @@ def changed(frame, row, **values):
 
 def test_everything_stands_in_the_order_in_which_it_was_told():
     frame = log_frame()
-    assert list(frame.columns) == list(MESSAGES)
+    assert list(frame.columns) == list(COLUMNS)
     assert frame["version"].unique().to_list() == [LOG_VERSION]
     told = frame.select("time_s", "kind", "vehicle_id").rows()
     assert told == [

@@ -1,4 +1,19 @@
-"""The kinds of messages, their columns and their order: what writer and reader of a log share."""
+"""The kinds of messages, their columns and their order: what writer and reader of a log share.
+
+Classes of ``messages.events`` and ``messages.commands``, and the kinds that they have in a log:
+
+=================== ============================================================================
+``RequestToEnter``  request
+``Report``          report
+``DetectorReading`` reading
+``Acknowledgement`` acknowledgement; ``messages.log`` writes one after each entry and command
+``Enter``           entry
+``Follow``          command
+``SetSignal``       signal
+no class            comparison, which is an entry of ``messages.log.Positions``, as reports of a
+                    whole run are; end, from ``messages.log.Told.end_step``
+=================== ============================================================================
+"""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -12,7 +27,7 @@ LOG_VERSION = 2
 TRAIT_COLUMNS = tuple(Traits._fields)
 """Columns of what a vehicle can do: null where only the common limits bind it."""
 PIECES = ("piece_time_s", "piece_station_m", "piece_speed_mps", "piece_accel_mps2")
-MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
+COLUMNS: dict[str, pl.DataType | type[pl.DataType]] = {
     "version": pl.Int64,
     "time_s": pl.Float64,
     "kind": pl.String,
@@ -49,7 +64,12 @@ class Kind(NamedTuple):
 
     def fits(self, columns: Collection[str]) -> bool:
         """Whether a message of this kind may have just these columns."""
-        return set(self.needs) <= set(columns) <= {*self.needs, *self.may_have}
+        return set(self.needs) <= set(columns) <= self.columns
+
+    @property
+    def columns(self) -> set[str]:
+        """Columns that a message of this kind has or may have."""
+        return {*self.needs, *self.may_have}
 
 
 REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, END = (
