@@ -49,6 +49,8 @@ COLUMNS: dict[str, pl.DataType | type[pl.DataType]] = {
     **{name: pl.Float64 for name in TRAIT_COLUMNS if name != "length_m"},
 }
 """The columns of a log. A message has those of its kind, and null in all others."""
+EVERY_KIND = ("version", "time_s", "kind")
+"""Columns that every message has."""
 
 
 class Kind(NamedTuple):
@@ -64,12 +66,13 @@ class Kind(NamedTuple):
 
     def fits(self, columns: Collection[str]) -> bool:
         """Whether a message of this kind may have just these columns."""
-        return set(self.needs) <= set(columns) <= self.columns
+        return set(self.needs) <= set(columns) <= {*self.needs, *self.may_have}
 
     @property
-    def columns(self) -> set[str]:
-        """Columns that a message of this kind has or may have."""
-        return {*self.needs, *self.may_have}
+    def lacks(self) -> tuple[str, ...]:
+        """Columns that a message of this kind cannot have, in their order."""
+        own = {*EVERY_KIND, *self.needs, *self.may_have}
+        return tuple(name for name in COLUMNS if name not in own)
 
 
 REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, END = (

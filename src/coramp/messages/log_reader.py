@@ -29,10 +29,11 @@ from coramp.road.streams import STREAMS
 class MessageLog:
     """A log that could be read: one entry a message in each array, numbers nan where there is none.
 
-    ``codes`` are the messages' kinds, as ``kinds.CODES`` numbers them. ``vehicle`` is the number of its vehicle's request, -1 where there is none; ``strangers`` are
-    rows about vehicles of the run that never asked to enter. ``requests`` are the rows of the
-    requests, by number. ``places`` are the messages' rows in the file. Commands' pieces are
-    ``pieces[first[row] : first[row + 1]]``.
+    ``codes`` are the messages' kinds, as ``kinds.CODES`` numbers them. ``vehicle`` is the number
+    of its vehicle's request, -1 where there is none; ``strangers`` are rows about vehicles of the
+    run that never asked to enter. ``requests`` are the rows of the requests, by number.
+    ``places`` are the messages' rows in the file. Commands' pieces are ``pieces[first[row] :
+    first[row + 1]]``.
     """
 
     path: Path
@@ -144,7 +145,7 @@ def _refuse(path: Path, frame: pl.DataFrame, wrong: BoolArray, told: str) -> Non
 
 
 def _check_values(path: Path, frame: pl.DataFrame) -> None:
-    """Refuses kinds that are none, numbers that are not finite, and what a kind lacks."""
+    """Refuses kinds that are none, numbers that are not finite, and columns not of the kind."""
     kinds = ", ".join(KINDS)
     known = frame["kind"].is_in(list(KINDS)).fill_null(value=False).to_numpy()
     _refuse(path, frame, ~known, f"there is no kind {{kind!r}}; allowed are {kinds}")
@@ -161,6 +162,10 @@ def _check_values(path: Path, frame: pl.DataFrame) -> None:
         for name in known_kind.needs:
             lacks = here & frame[name].is_null().to_numpy()
             _refuse(path, frame, lacks, f"has no {name}; allowed is a value")
+        for name in known_kind.lacks:
+            has = here & frame[name].is_not_null().to_numpy()
+            told = f"a message of kind {said} has no such column; allowed is null"
+            _refuse(path, frame, has, f"{name} {{{name}}}: {told}")
     counts = np.column_stack([frame[n].list.len().fill_null(0).to_numpy() for n in PIECES])
     commands = frame["kind"].is_in([ENTRY, COMMAND]).to_numpy()
     uneven = (counts != counts[:, :1]).any(axis=1) | (commands != (counts[:, 0] > 0))
