@@ -24,6 +24,7 @@ from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.style import look_of
 from coramp.report.varied_figure import readable, varied_figure
+from coramp.road.streams import STREAMS
 from coramp.runs.beforehand import of_automation
 from coramp.scenarios.toml_files import builtin_names
 from coramp.studies.definition import Study, count_runs
@@ -147,7 +148,7 @@ def _answer(good: pl.DataFrame) -> str:
     for (strategy, drivers), group in at.group_by(["strategy", "drivers"], maintain_order=True):
         delays = tuple(
             with_interval(estimate(group[f"{stream}_delay_s"].drop_nulls().to_list()))
-            for stream in ("mainline", "ramp")
+            for stream in STREAMS
         )
         name = look_of(str(strategy), str(drivers) if drivers else None).label
         losing.setdefault(delays, []).append(name)
