@@ -35,6 +35,18 @@ from coramp.scenarios.sections import (
 )
 from coramp.scenarios.stations import chosen_decision_station_m
 from coramp.scenarios.vehicle_types import VehicleType
+from coramp.scenarios.world_sections import (
+    TABLES,
+    Actuators,
+    Behaviour,
+    Clock,
+    CommandLink,
+    Incidents,
+    Positioning,
+    ReportLink,
+    RoadSurface,
+    World,
+)
 from coramp.strategies.parameters import Value
 from coramp.vehicles.traits import CAR, Traits
 
@@ -70,6 +82,15 @@ class Scenario(Model):
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = Field(default_factory=dict)
     traffic: TrafficMix = TrafficMix()
+    world: World = World()
+    positioning: Positioning = Positioning()
+    clock: Clock = Clock()
+    reports: ReportLink = ReportLink()
+    commands: CommandLink = CommandLink()
+    actuators: Actuators = Actuators()
+    road: RoadSurface = RoadSurface()
+    behaviour: Behaviour = Behaviour()
+    incidents: Incidents = Incidents()
 
     @field_validator("strategy", mode="before")
     @classmethod
@@ -119,6 +140,11 @@ class Scenario(Model):
         """Whether some vehicle of this scenario may have a driver."""
         kinds = [(kind.name, ramp) for kind in self.vehicle_types for ramp in (False, True)]
         return any(self.automated_share_of(*kind) < 1.0 for kind in kinds)
+
+    @property
+    def has_faults(self) -> bool:
+        """Whether the world of this scenario is not perfect."""
+        return not all(getattr(self, table).is_perfect for table in TABLES)
 
     @property
     def has_automated(self) -> bool:

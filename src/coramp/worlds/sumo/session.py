@@ -81,6 +81,18 @@ class Session:
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise CorampError(f"SUMO: {error}") from error
 
+    def step_on(self) -> None:
+        """Executes one step."""
+        try:
+            libsumo.simulationStep()
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise CorampError(f"SUMO: {error}") from error
+
+    def still_here(self, names: Sequence[str]) -> list[bool]:
+        """Returns which of these vehicles are on the road."""
+        here = set(libsumo.vehicle.getIDList())
+        return [name in here for name in names]
+
     def vehicles_left(self) -> int:
         """Returns how many vehicles drive or are still to enter."""
         return int(libsumo.simulation.getMinExpectedNumber())
