@@ -117,8 +117,9 @@ def driver_routes(
             name += f"-{arrival.vehicle_id}"  # each draws a top speed of its own
         elif arrival.vehicle_type != CAR:
             name += f"-{arrival.vehicle_type}"
+        name += _carelessness_name(own)
         size = f'length="{arrival.length_m!r}" {_wish(drivers, wish_mps)}'
-        manners = f"{_manners(drivers, own.tau_s)}{_ability(drivers, arrival)}"
+        manners = f"{_manners(drivers, own)}{_ability(drivers, arrival)}"
         types[name] = f'  <vType id="{name}" {size} {manners}{_class(scenario, arrival)}/>'
         vehicles.append(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
@@ -180,12 +181,19 @@ def _wish(drivers: DriverPopulation, wish_mps: float) -> str:
     return f'maxSpeed="{drivers.speed_factor.high * wish_mps!r}"'
 
 
-def _manners(drivers: DriverPopulation, tau_s: float) -> str:
+def _carelessness_name(own: DriverTraits) -> str:
+    never = "-never-yields" if own.never_yields else ""
+    return never if own.looks_each_s is None else f"{never}-looks-each-{own.looks_each_s:g}"
+
+
+def _manners(drivers: DriverPopulation, own: DriverTraits) -> str:
     model = drivers.car_following
+    yields = 0.0 if own.never_yields else drivers.lc_cooperative
+    looks = "" if own.looks_each_s is None else f' actionStepLength="{own.looks_each_s!r}"'
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (
-        f'{noise}tau="{tau_s!r}" '
-        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{drivers.lc_cooperative!r}"'
+        f'{noise}tau="{own.tau_s!r}" '
+        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{yields!r}"{looks}'
     )
 
 

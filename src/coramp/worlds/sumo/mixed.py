@@ -20,6 +20,7 @@ from coramp.strategies.base import steps_of_period
 from coramp.worlds.faults.air import Air
 from coramp.worlds.outcomes import cap_step_of
 from coramp.worlds.sumo.as_driven import outcome_as_driven
+from coramp.worlds.sumo.careless import Careless
 from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
 from coramp.worlds.sumo.mixed_plant import MixedPlant
@@ -32,7 +33,7 @@ from coramp.worlds.sumo.mixed_setup import (
 )
 from coramp.worlds.sumo.network import driver_road_plan
 from coramp.worlds.sumo.session import Session
-from coramp.worlds.sumo.traits import traits_of
+from coramp.worlds.sumo.traits import traits_of, with_careless
 
 FOLLOWING = FollowingLaw()
 
@@ -52,7 +53,7 @@ def run_mixed(
     automated = automated_of(scenario, arrivals, seed)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic=False, sampled=True)
-        traits = traits_of(drivers, arrivals, seed)
+        traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
         types = automated_types(scenario, automated, law)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
         with Session(files.options(), step_s, options.gui) as session:
@@ -66,13 +67,21 @@ def run_mixed(
                 actuators_of(scenario, len(arrivals)),
             )
             control = _control(scenario, strategy, population, arrivals, seed)
-            control.drive(plant, cap_step_of(scenario))
+            careless = Careless(scenario, session, seed)
+            control.drive(plant, careless, cap_step_of(scenario))
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions, collided = files.collisions(), files.collided(arrivals)
     outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
     passages = replace(outcome.passages, plan_error_m=plant.largest_error_m, automated=automated)
-    return replace(outcome, passages=passages, drivers=population, collided=collided)
+    return replace(
+        outcome,
+        passages=passages,
+        drivers=population,
+        collided=collided,
+        messages_of_air=control.air.counts,
+        world_events=tuple(careless.events),
+    )
 
 
 def _control(
@@ -105,15 +114,18 @@ class Control:
     following: FollowingLaw = FOLLOWING
     places: Places = field(default=())
 
-    def drive(self, plant: MixedPlant, cap_step: int) -> None:
+    def drive(self, plant: MixedPlant, careless: Careless, cap_step: int) -> None:
         """Lets SUMO run until it is empty, commanding once a period."""
         step = 0
         while step < cap_step and (step == 0 or plant.session.vehicles_left()):
             step = min(cap_step, step + plant.period_steps)
             plant.session.step_to(step)
             names, on_lane, users = plant.users()
+            now_s = step * plant.step_s
+            careless.act_among(now_s, names, users)
             if users.automated.any():
-                accel_mps2, changes = self.commands(step * plant.step_s, plant, on_lane, users)
+                accel_mps2, changes = self.commands(now_s, plant, on_lane, users)
+                accel_mps2 = careless.with_breakdown(now_s, users.number, accel_mps2)
                 plant.command(names, users, accel_mps2, changes)
 
     def commands(

@@ -23,6 +23,8 @@ OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
+DRIVERS_CARE = 31
+"""Speed mode of a driver: with all checks."""
 DRIVERS_CHANGES = 1621
 """SUMO's own lane change mode: drivers yield to a vehicle that would like to change."""
 GREEN, YELLOW, RED = "G", "y", "r"
@@ -118,6 +120,23 @@ class Session:
         """Commands a vehicle's speed; SUMO still has it ask drivers to make room for it."""
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
         libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
+
+    def force(self, vehicle_id: str, speed_mps: float, time_s: float) -> None:
+        """Has a driver change to a speed, whatever is around him, until he is released."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.slowDown(vehicle_id, speed_mps, max(time_s, self._step_s))
+
+    def hold(self, vehicle_id: str, speed_mps: float) -> None:
+        """Has a driver keep a speed until he is released."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
+
+    def release(self, vehicle_id: str) -> None:
+        """Leaves a vehicle to its driver again; one that has left the road needs nothing."""
+        if vehicle_id in libsumo.vehicle.getIDList():
+            libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
+            libsumo.vehicle.setSpeed(vehicle_id, -1.0)
 
     def judge_gaps_by(self, vehicle_id: str, tau_s: float) -> None:
         """Sets the time gap by which SUMO judges gaps of a vehicle, its own and behind others."""
