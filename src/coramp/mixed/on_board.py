@@ -121,7 +121,8 @@ def may_change_lane(
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        braking_m = (rear_mps**2 - speed_mps**2) / (2.0 * law.driver_mps2)
+        slower_mps = min(speed_mps, ahead.speed_mps[own])
+        braking_m = (rear_mps**2 - slower_mps**2) / (2.0 * law.driver_mps2)
         needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
         return bool(free_m >= max(TOUCHING_M, needs_m))
     spare_mps = _keeps_mps(users, rear, own, ahead, law) - ahead.speed_mps[rear]

@@ -14,8 +14,8 @@ from coramp.worlds.sumo.network import RAMP_LANES
 from coramp.worlds.sumo.session import Session
 
 MERGE_LANE = "merge_0"
-NO_GAP_S = 30.0
-"""With such a time gap SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
+NO_GAP_S, NOT_ASSERTIVE = 30.0, 0.001
+"""With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
 
 
 @dataclass
@@ -99,13 +99,13 @@ class MixedPlant:
         for i in own[new].tolist():
             self.session.take_over_among_drivers(names[i])
             if not users.on_mainline[i]:
-                self.session.judge_gaps_by(names[i], NO_GAP_S)
+                self.session.judge_gaps_by(names[i], NO_GAP_S, NOT_ASSERTIVE)
         for i in own[users.on_mainline[own]].tolist():
             if int(users.number[i]) in self._changing:
                 self.session.take_over_among_drivers(names[i])
                 self._changing.discard(int(users.number[i]))
         for i in np.flatnonzero(changes).tolist():
-            self.session.judge_gaps_by(names[i], self.tau_s)
+            self.session.judge_gaps_by(names[i], self.tau_s, 1.0)
             self.session.change_lane_now(names[i], 1, self.period_steps)
             self._changing.add(int(users.number[i]))
         chosen = [names[i] for i in own.tolist()]

@@ -138,9 +138,14 @@ class Session:
             libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
             libsumo.vehicle.setSpeed(vehicle_id, -1.0)
 
-    def judge_gaps_by(self, vehicle_id: str, tau_s: float) -> None:
-        """Sets the time gap by which SUMO judges gaps of a vehicle, its own and behind others."""
+    def judge_gaps_by(self, vehicle_id: str, tau_s: float, assertive: float) -> None:
+        """Sets by what SUMO judges gaps for a vehicle that would like to change lanes.
+
+        It asks for ``tau_s`` behind the vehicle in front, and divides what it asks for by
+        ``assertive``.
+        """
         libsumo.vehicle.setTau(vehicle_id, tau_s)
+        libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", repr(assertive))
 
     def drive_evenly(
         self, vehicle_id: str, before_mps: float, after_mps: float, steps: int
