@@ -40,6 +40,8 @@ YIELDED_TO = 'lcCooperative="1"'
 MERGE_LANE = "merge_0"
 NO_GAP_S = 30.0
 """With such a time gap SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
+NO_GAP_SHARE = 0.75
+"""Beyond this share of the acceleration lane SUMO takes gaps that such a time gap rules out."""
 FOLLOWING = FollowingLaw()
 
 
@@ -107,6 +109,7 @@ def run_mixed(
                 steps_of_period(strategy.decision_s, step_s),
                 step_s,
                 types.tau_s,
+                NO_GAP_SHARE * scenario.ramp.acceleration_lane_m,
             )
             hears = automated | connected_of(scenario, arrivals, seed)
             Control(scenario, strategy, gaps_of(scenario, drivers), law, hears).drive(
@@ -159,8 +162,8 @@ class MixedPlant:
 
     An automated vehicle's speed is that of its commands: under Euler steps SUMO's own is off by
     half a step's acceleration. ``tau_s`` is the time gap by which drivers know it, once it is on
-    the mainline. ``largest_error_m`` is how far each was from where it was sent, nan
-    for drivers.
+    the mainline; from ``no_gap_from_m`` on SUMO is told outright to change no lane by itself.
+    ``largest_error_m`` is how far each was from where it was sent, nan for drivers.
     """
 
     session: Session
@@ -169,10 +172,12 @@ class MixedPlant:
     period_steps: int
     step_s: float
     tau_s: float
+    no_gap_from_m: float
     largest_error_m: FloatArray = field(init=False)
     _sent_mps: FloatArray = field(init=False)
     _sent_m: FloatArray = field(init=False)
     _changing: set[int] = field(default_factory=set)
+    _held: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         """Nobody has been sent anywhere yet."""
@@ -246,9 +251,17 @@ class MixedPlant:
                 self.session.judge_gaps_by(name, self.tau_s)
                 self.session.change_lane_now(name, 1, self.period_steps)
                 self._changing.add(i_number := int(number[k]))
+            elif not users.on_mainline[i] and users.station_m[i] > self.no_gap_from_m:
+                self._hold(name)
             elif users.on_mainline[i] and (i_number := int(number[k])) in self._changing:
                 self.session.take_over_among_drivers(name)
                 self._changing.discard(i_number)
+
+    def _hold(self, name: str) -> None:
+        """Has SUMO take no gap by itself for a vehicle from now on."""
+        if name not in self._held:
+            self.session.accept_no_gap(name)
+            self._held.add(name)
 
 
 @dataclass

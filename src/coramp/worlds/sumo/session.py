@@ -111,6 +111,10 @@ class Session:
         """Sets the time gap by which SUMO judges gaps of a vehicle, its own and behind others."""
         libsumo.vehicle.setTau(vehicle_id, tau_s)
 
+    def accept_no_gap(self, vehicle_id: str) -> None:
+        """Has SUMO think each gap a thousand times too small for a vehicle to change lanes."""
+        libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", "0.001")
+
     def drive_evenly(
         self, vehicle_id: str, before_mps: float, after_mps: float, steps: int
     ) -> None:
