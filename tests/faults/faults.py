@@ -154,4 +154,29 @@ FAULTS = (
         ),
         BUSY,
     ),
+    Fault(
+        "automated vehicles reckon with the leader's stop as if it braked at half of b",
+        (
+            Edit(
+                "mixed/on_board.py",
+                "leader_mps**2 / (2.0 * law.braking_mps2)",
+                "leader_mps**2 / (1.0 * law.braking_mps2)",
+            ),
+        ),
+        STEERED,
+        "tests/mixed/test_on_board.py::test_the_largest_speed_that_keeps_the_distance",
+    ),
+    Fault(
+        "who pushes in before a driver is not to blame for his running into it",
+        (
+            Edit(
+                "checker/among_drivers.py",
+                "return BY_AUTOMATED if pushed else BY_DRIVER",
+                "return BY_DRIVER",
+            ),
+        ),
+        STEERED,
+        "tests/checker/test_among_drivers.py"
+        "::test_a_driver_who_hits_whoever_pushed_in_is_not_to_blame",
+    ),
 )

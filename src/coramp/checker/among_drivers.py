@@ -105,18 +105,21 @@ def findings_of(
     cut_in = short & came_in[pairs.front] & ~seen.automated[front]
     hard = keeps & ~seen.automated[front]
     hard &= braking_mps2[pairs.front] > limits.braking_mps2 + EXACT_MPS2
+    touching = _first_of_each(time_s, rear, front, pairs.gap_m < -TOUCH_M)
+    touched = _first_of_two([*reported, *touching])
     broken = [
         Broken(float(time_s[k]), int(rear[k]), int(front[k]), CUT_IN if cut_in[k] else HARD_BRAKING)
         for k in np.flatnonzero(cut_in | hard)
     ]
+    broken = [b for b in broken if not _over(touched, b.time_s, b.rear, b.front)]
     unkept = _first_of_each(time_s, rear, front, short)
     unkept += _first_of_each(time_s, rear, front, _pushed_in(seen, pairs, came_in, limits))
-    unkept = [pair for pair in unkept if not _explained(pair, broken)]
-    touching = _first_of_each(time_s, rear, front, pairs.gap_m < -TOUCH_M)
-    every = {(r, f): t for t, r, f in sorted([*reported, *touching], reverse=True)}
+    unkept = [
+        pair for pair in unkept if not (_over(touched, *pair) or _explained(pair, broken))
+    ]
     collisions = tuple(
-        Collision(t, r, f, _cause((t, r, f), seen.automated, broken, unkept))
-        for (r, f), t in sorted(every.items(), key=lambda item: item[1])
+        Collision(*pair, _cause(pair, seen.automated, broken, unkept))
+        for pair in sorted(touched.values())
     )
     return Findings(collisions, tuple(_once(broken)), tuple(unkept))
 
@@ -173,6 +176,24 @@ def _first_of_each(
     for k in np.flatnonzero(chosen):
         found.setdefault((int(rear[k]), int(front[k])), float(time_s[k]))
     return [(t, r, f) for (r, f), t in found.items()]
+
+
+def _first_of_two(
+    touching: Sequence[tuple[float, int, int]],
+) -> dict[frozenset[int], tuple[float, int, int]]:
+    """The first collision of any two: a simulator lets them drive on, through one another."""
+    found: dict[frozenset[int], tuple[float, int, int]] = {}
+    for time_s, rear, front in sorted(touching):
+        found.setdefault(frozenset((rear, front)), (time_s, rear, front))
+    return found
+
+
+def _over(
+    touched: dict[frozenset[int], tuple[float, int, int]], time_s: float, rear: int, front: int
+) -> bool:
+    """Whether two have collided before: what is between them then tells nothing."""
+    pair = frozenset((rear, front))
+    return pair in touched and time_s > touched[pair][0]
 
 
 def _once(broken: Sequence[Broken]) -> list[Broken]:

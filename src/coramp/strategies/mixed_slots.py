@@ -35,7 +35,7 @@ class MixedSlots:
     order: str = choice(
         "least-cost", "mainline-first", "ramp-first", meaning="who falls back where both could"
     )
-    decision_s: float = parameter(0.2, 0.1, 1.0, meaning="time between two decisions")
+    decision_s: float = parameter(0.2, 0.1, 0.5, meaning="time between two decisions")
     own_weight: float = parameter(
         2.0, 0.1, 20.0, meaning="cost of a metre that the ramp vehicle itself falls back"
     )

@@ -1,14 +1,12 @@
 """Automated vehicles among SUMO's own drivers: they are commanded anew each period."""
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
-from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.laws import FollowingLaw, SafetyLaw
 from coramp.mixed.on_board import driven_mps2, may_change_lane, neighbours_of
@@ -49,7 +47,9 @@ def run_mixed(
     drivers = scenario.drivers[population]
     arrivals = arrivals_of(scenario, seed)
     plan = driver_road_plan(scenario, drivers)
-    law, step_s = safety_law_of(scenario), scenario.control.step_s
+    step_s = scenario.control.step_s
+    period_steps = steps_of_period(strategy.decision_s, step_s)
+    law = safety_law_of(scenario, period_steps * step_s)
     automated = automated_of(scenario, arrivals, seed)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic=False, sampled=True)
@@ -61,12 +61,15 @@ def run_mixed(
                 session,
                 plan.lane_starts_m(),
                 Able.of(scenario, arrivals, automated),
-                steps_of_period(strategy.decision_s, step_s),
+                period_steps,
                 step_s,
                 types.tau_s,
                 actuators_of(scenario, len(arrivals)),
             )
-            control = _control(scenario, strategy, population, arrivals, seed)
+            heard = automated | connected_of(scenario, arrivals, seed)
+            speeds = scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps
+            air = Air(scenario, heard, automated, seed)
+            control = Control(strategy, gaps_of(scenario, drivers), law, MixedRoad(*speeds), air)
             careless = Careless(scenario, session, seed)
             control.drive(plant, careless, cap_step_of(scenario))
         files.keep()
@@ -81,24 +84,6 @@ def run_mixed(
         collided=collided,
         messages_of_air=control.air.counts,
         world_events=tuple(careless.events),
-    )
-
-
-def _control(
-    scenario: Scenario,
-    strategy: MixedStrategy,
-    population: str,
-    arrivals: Sequence[Arrival],
-    seed: int,
-) -> "Control":
-    automated = automated_of(scenario, arrivals, seed)
-    heard = automated | connected_of(scenario, arrivals, seed)
-    return Control(
-        strategy,
-        gaps_of(scenario, scenario.drivers[population]),
-        safety_law_of(scenario),
-        MixedRoad(scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps),
-        Air(scenario, heard, automated, seed),
     )
 
 

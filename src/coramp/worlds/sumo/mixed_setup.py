@@ -44,16 +44,20 @@ def gaps_of(scenario: Scenario, drivers: DriverPopulation) -> Gaps:
     )
 
 
-def safety_law_of(scenario: Scenario) -> SafetyLaw:
-    """Returns what automated vehicles keep on board on this road.
+def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
+    """Returns what automated vehicles keep on board on this road, commanded once a period.
 
-    Drivers move in Euler steps, in which one that brakes from v comes to a stand v h / 2 earlier
+    They react no sooner than at their next command. Drivers move in Euler steps, in which one that brakes from v comes to a stand v h / 2 earlier
     than by v^2 / (2 b).
     """
     law = SafetyLaw()
     shorter_m = 0.5 * scenario.mainline.limit_mps * scenario.control.step_s
     end_m = scenario.ramp.acceleration_lane_m - LANE_END_M
-    return law._replace(margin_m=max(law.margin_m, shorter_m), lane_end_m=end_m)
+    return law._replace(
+        reaction_s=max(law.reaction_s, period_s),
+        margin_m=max(law.margin_m, shorter_m),
+        lane_end_m=end_m,
+    )
 
 
 def automated_types(scenario: Scenario, automated: BoolArray, law: SafetyLaw) -> Automated:

@@ -1,0 +1,232 @@
+"""What a vehicle keeps on board, whatever it is told: driven here in plain Python."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from coramp.mixed.laws import FollowingLaw, SafetyLaw
+from coramp.mixed.on_board import (
+    distance_speed_mps,
+    driven_mps2,
+    may_change_lane,
+    neighbours_of,
+)
+from coramp.worlds.sumo.mixed import LANE_END_M
+from tests.mathematics import close
+from tests.mixed.roads import FOLLOWING, GAPS, ROAD, SAFETY, users_of
+
+OURS = SafetyLaw()
+PIECE_S = 0.05
+PERIODS_S = [0.1, 0.2, 0.3, 0.5]
+leader_accel = st.floats(-OURS.braking_mps2, 2.5)
+speeds = st.floats(0.0, 25.0)
+brakes = st.sampled_from([4.0, 5.0, 6.0])
+
+
+class Leader:
+    """Drives as it likes, braking at most at b; evenly or, as SUMO's drivers do, in Euler steps."""
+
+    def __init__(self, station_m, speed_mps, euler):
+        self.station_m, self.speed_mps, self.euler = station_m, speed_mps, euler
+
+    def drive(self, accel_mps2, for_s):
+        new_mps = max(0.0, self.speed_mps + accel_mps2 * for_s)
+        if self.euler:
+            self.station_m += new_mps * for_s
+        elif new_mps > 0.0 or accel_mps2 >= 0.0:
+            self.station_m += 0.5 * (self.speed_mps + new_mps) * for_s
+        else:
+            self.station_m += self.speed_mps**2 / (2.0 * -accel_mps2)
+        self.speed_mps = new_mps
+
+
+def stops_in_m(speed_mps, braking_mps2):
+    return speed_mps**2 / (2.0 * braking_mps2)
+
+
+def accel_of(own, leaders, braking_mps2, told_mps2, period_s, *, changes):
+    """What the vehicle does behind leaders; with two, the first is in its own lane."""
+    lane = not changes
+    rows = [(*own, lane, True, 5.0, braking_mps2)]
+    rows += [(x.station_m, x.speed_mps, lane or k > 0, False) for k, x in enumerate(leaders)]
+    users = users_of(rows)
+    changing = np.zeros(len(rows), np.bool_)
+    changing[0] = changes
+    told = np.full(len(rows), told_mps2)
+    law = OURS._replace(lane_end_m=1e6, reaction_s=max(OURS.reaction_s, period_s))
+    around = neighbours_of(users)
+    return driven_mps2(users, around, told, changing, GAPS, FollowingLaw(), law, ROAD, period_s)[0]
+
+
+def smallest_gap_m(own_mps, braking_mps2, leaders, motions, told_mps2, period_s):
+    """Drives on, and returns the smallest gap to any leader that there was."""
+    own_m, smallest_m = 0.0, math.inf
+    pieces = round(period_s / PIECE_S)
+    for accels_mps2 in motions:
+        changes = len(leaders) > 1
+        accel = accel_of(
+            (own_m, own_mps), leaders, braking_mps2, told_mps2, period_s, changes=changes
+        )
+        assert accel >= -OURS.hardest_mps2
+        for _ in range(pieces):
+            for leader, leader_mps2 in zip(leaders, accels_mps2, strict=True):
+                leader.drive(leader_mps2, PIECE_S)
+            new_mps = max(0.0, own_mps + accel * PIECE_S)
+            own_m += 0.5 * (own_mps + new_mps) * PIECE_S
+            own_mps = new_mps
+            smallest_m = min(smallest_m, *(x.station_m - 5.0 - own_m for x in leaders))
+    return smallest_m
+
+
+def leader_at_distance(own_mps, braking_mps2, leader_mps, more_m, euler):
+    """Returns a leader that is just as far ahead as the law asks, and ``more_m`` more."""
+    needs_m = stops_in_m(own_mps, braking_mps2) - stops_in_m(leader_mps, OURS.braking_mps2)
+    gap_m = OURS.margin_m + max(0.0, needs_m) + more_m
+    return Leader(gap_m + 5.0, leader_mps, euler)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    speeds,
+    brakes,
+    speeds,
+    st.floats(0.0, 30.0),
+    st.booleans(),
+    st.lists(leader_accel, min_size=1, max_size=60),
+    st.sampled_from([-1.0, 0.0, math.inf]),
+    st.sampled_from(PERIODS_S),
+)
+@example(20.0, 6.0, 20.0, 0.0, True, [-6.0] * 40, math.inf, 0.3)
+@example(25.0, 4.0, 5.0, 0.0, True, [-6.0] * 60, math.inf, 0.3)
+def test_who_keeps_the_distance_never_touches_a_leader_that_brakes_at_most_at_b(
+    own_mps, braking_mps2, leader_mps, more_m, euler, motion, told_mps2, period_s
+):
+    leader = leader_at_distance(own_mps, braking_mps2, leader_mps, more_m, euler)
+    motions = [(accel,) for accel in motion] + [(-OURS.braking_mps2,)] * 40
+    found_m = smallest_gap_m(own_mps, braking_mps2, [leader], motions, told_mps2, period_s)
+    assert found_m > 0.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    speeds,
+    brakes,
+    st.tuples(speeds, speeds),
+    st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 30.0)),
+    st.booleans(),
+    st.lists(st.tuples(leader_accel, leader_accel), min_size=1, max_size=40),
+    st.sampled_from(PERIODS_S),
+)
+@example(20.0, 6.0, (20.0, 20.0), (10.0, 0.0), True, [(0.0, -6.0)] * 20, 0.3)
+def test_who_changes_lanes_keeps_the_distance_in_both(
+    own_mps, braking_mps2, leaders_mps, more_m, euler, motion, period_s
+):
+    leaders = [
+        leader_at_distance(own_mps, braking_mps2, mps, more, euler)
+        for mps, more in zip(leaders_mps, more_m, strict=True)
+    ]
+    motions = [*motion, *[(-OURS.braking_mps2,) * 2] * 40]
+    assert smallest_gap_m(own_mps, braking_mps2, leaders, motions, math.inf, period_s) > 0.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.floats(-300.0, 190.0),
+    st.floats(0.0, 20.0),
+    st.sampled_from([0.1, 0.2, 0.5]),
+    st.floats(-2.0, 5.0),
+)
+def test_who_does_not_merge_stands_before_the_lane_ends(station_m, speed_mps, period_s, told_mps2):
+    left_m = SAFETY.lane_end_m - station_m
+    assume(speed_mps <= math.sqrt(2.0 * SAFETY.stop_mps2 * left_m))
+    assume(speed_mps <= ROAD.ramp_limit_mps or station_m >= 0.0)
+    largest_mps2 = 0.0
+    for _ in range(round(120.0 / period_s)):
+        users = users_of([(station_m, speed_mps, False, True)])
+        told, changes = np.array([max(told_mps2, 0.0)]), np.zeros(1, np.bool_)
+        accel = driven_mps2(
+            users, neighbours_of(users), told, changes, GAPS, FOLLOWING, SAFETY, ROAD, period_s
+        )[0]
+        new_mps = speed_mps + accel * period_s
+        assert new_mps >= -1e-9
+        station_m += 0.5 * (speed_mps + new_mps) * period_s
+        largest_mps2 = max(largest_mps2, -accel)
+        speed_mps = new_mps
+    # each period begins a little late: 2 a t^2, of the LANE_END_M that are left
+    assert station_m < SAFETY.lane_end_m + 2.0 * SAFETY.stop_mps2 * period_s**2 + 1e-6
+    assert 2.0 * OURS.stop_mps2 * 0.5**2 < LANE_END_M
+    assert largest_mps2 < SAFETY.hardest_mps2
+
+
+def test_the_largest_speed_that_keeps_the_distance():
+    """By hand: after 0.3 s at (20 + v')/2, v'^2/12 is left of 20 m - 1 m + 16^2/12 = 40.333 m.
+
+    v'^2/12 + 0.15 v' = 37.333, so v' = 6 (sqrt(0.15^2 + 37.333/3) - 0.15) = 20.285.
+    """
+    found = distance_speed_mps(20.0, 20.0, 16.0, 6.0, SAFETY)
+    assert found == pytest.approx(20.285, abs=1e-3)
+    assert (20.0 + found) / 2.0 * 0.3 + found**2 / 12.0 == close(20.0 - 1.0 + 256.0 / 12.0)
+    assert distance_speed_mps(1.0, 0.0, 0.0, 6.0, SAFETY) == 0.0
+    assert distance_speed_mps(3.9, 20.0, 0.0, 6.0, SAFETY) == 0.0
+    # 4 m, both stand: v'^2/12 + 0.15 v' = 3, so v' = 6 (sqrt(0.0225 + 1) - 0.15) = 5.16712
+    assert distance_speed_mps(4.0, 0.0, 0.0, 6.0, SAFETY) == pytest.approx(5.16712, abs=1e-5)
+
+
+def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
+    """By hand: at 20 behind 14 m/s he keeps 2.5 + 20 and brakes over (400 - 196)/9 = 22.667 m.
+
+    That is 45.167 m, less 1.5 m: 43.667 m to the tail, 48.667 m to the front bumper.
+    """
+
+    def may(rear_m):
+        users = users_of([(100.0, 14.0, False, True), (rear_m, 20.0, True, False)])
+        return may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+
+    assert may(100.0 - 5.0 - 43.68)
+    assert not may(100.0 - 5.0 - 43.65)
+
+
+def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_behind():
+    def may(*others):
+        users = users_of([(100.0, 18.0, False, True), *others])
+        return may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+
+    assert may()
+    assert may((140.0, 18.0, True, False), (60.0, 18.0, True, True))
+    assert not may((106.0, 18.0, True, False))
+    assert not may((130.0, 3.0, True, False))
+    assert not may((94.0, 18.0, True, True))
+    assert not may((70.0, 25.0, True, True))
+
+
+def test_nobody_changes_lanes_before_the_nose_or_from_the_mainline():
+    for row in [(0.5, 16.0, False, True), (-20.0, 16.0, False, True), (50.0, 16.0, True, True)]:
+        users = users_of([row])
+        assert not may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+
+
+def test_drivers_are_given_nothing_to_do():
+    users = users_of([(100.0, 20.0, True, False), (94.0, 20.0, True, False)])
+    told, changes = np.full(2, -3.0), np.zeros(2, np.bool_)
+    accel = driven_mps2(
+        users, neighbours_of(users), told, changes, GAPS, FOLLOWING, SAFETY, ROAD, 0.2
+    )
+    assert accel.tolist() == [0.0, 0.0]
+
+
+def test_who_is_ahead_and_who_is_beside():
+    users = users_of(
+        [
+            (50.0, 20.0, True, True),
+            (10.0, 16.0, False, True),
+            (-30.0, 20.0, True, False),
+            (30.0, 16.0, False, False),
+        ]
+    )
+    around = neighbours_of(users)
+    assert around.leader.tolist() == [-1, 3, 0, -1]
+    assert around.front.tolist() == [-1, 0, -1, 0]
+    assert around.rear.tolist() == [-1, 2, -1, 2]
