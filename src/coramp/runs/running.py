@@ -155,7 +155,7 @@ def make_spec(
     population = None
     if drivers is not None or not chosen.cooperative or loaded.is_mixed:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
-    if loaded.is_mixed:
+    if loaded.is_mixed or (loaded.gives_shares and not chosen.cooperative):
         check_mixed(loaded, chosen, engine, population or "")
     elif chosen.cooperative:
         population = None

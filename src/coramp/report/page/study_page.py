@@ -168,8 +168,9 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
 
 def _without_effect(runs: pl.DataFrame) -> list[str]:
     """The settings of runs with drivers that bind coordinated vehicles only."""
-    of_drivers = runs.filter(pl.col("drivers").is_not_null()).iter_rows(named=True)
-    return of_automation([overrides_of(row) for row in of_drivers])
+    among_drivers = pl.col("drivers").is_not_null() & pl.col("automated_vehicles").is_null()
+    rows = runs.filter(among_drivers).iter_rows(named=True)
+    return of_automation([overrides_of(row) for row in rows])
 
 
 def _failed(runs: pl.DataFrame) -> Table | None:
