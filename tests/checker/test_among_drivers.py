@@ -44,9 +44,7 @@ def seen_of(*ways):
     rows = [
         (vehicle, k * STEP_S, station_m, speed_mps, k >= way.in_lane_from)
         for vehicle, way in enumerate(ways)
-        for k, (station_m, speed_mps) in enumerate(
-            zip(way.stations_m, way.speeds_mps, strict=True)
-        )
+        for k, (station_m, speed_mps) in enumerate(zip(way.stations_m, way.speeds_mps, strict=True))
     ]
     vehicle, time_s, station_m, speed_mps, on_mainline = zip(*rows, strict=True)
     return Seen(

@@ -114,9 +114,7 @@ def findings_of(
     broken = [b for b in broken if not _over(touched, b.time_s, b.rear, b.front)]
     unkept = _first_of_each(time_s, rear, front, short)
     unkept += _first_of_each(time_s, rear, front, _pushed_in(seen, pairs, came_in, limits))
-    unkept = [
-        pair for pair in unkept if not (_over(touched, *pair) or _explained(pair, broken))
-    ]
+    unkept = [pair for pair in unkept if not (_over(touched, *pair) or _explained(pair, broken))]
     collisions = tuple(
         Collision(*pair, _cause(pair, seen.automated, broken, unkept))
         for pair in sorted(touched.values())

@@ -47,7 +47,12 @@ def _among_drivers(strategy: type[Strategy]) -> bool:
 
 
 def broken_among_drivers(row: Mapping[str, Any]) -> list[str]:
-    """Returns in words what automated vehicles among drivers promised and did not keep."""
+    """Returns in words what automated vehicles among drivers promised and did not keep.
+
+    Those that nobody coordinates, and that so have no plan to be off, promise nothing.
+    """
+    if row.get("plan_error_m") is None:
+        return []
     broken = []
     if row.get("collisions_by_automated"):
         broken.append(f"{row['collisions_by_automated']} collisions that automated vehicles caused")

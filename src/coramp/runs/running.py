@@ -157,7 +157,7 @@ def make_spec(
     among_drivers = loaded.is_mixed or loaded.has_faults
     if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
-    if among_drivers:
+    if among_drivers or (loaded.gives_shares and not chosen.cooperative):
         check_mixed(loaded, chosen, engine, population or "")
     elif chosen.cooperative:
         population = None

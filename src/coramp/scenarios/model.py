@@ -136,6 +136,12 @@ class Scenario(Model):
         return self.traffic.share_of(on_ramp) if own is None else own
 
     @property
+    def gives_shares(self) -> bool:
+        """Whether it says which share is automated: of all vehicles, of a stream or of a type."""
+        of_types = (kind.automated_share is not None for kind in self.vehicle_types)
+        return self.traffic.gives_shares or any(of_types)
+
+    @property
     def is_mixed(self) -> bool:
         """Whether some vehicle of this scenario may have a driver."""
         kinds = [(kind.name, ramp) for kind in self.vehicle_types for ramp in (False, True)]

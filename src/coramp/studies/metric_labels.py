@@ -35,6 +35,8 @@ LABELS: dict[str, MetricLabel] = {
     "mainline_fcfs_delay_s": MetricLabel("mainline delay, first come first served", "s"),
     "ramp_fcfs_delay_s": MetricLabel("ramp delay, first come first served", "s"),
     "lane_limit_veh_h": MetricLabel("most that the lane carries", "veh/h", 0),
+    "automated_delay_s": MetricLabel("delay of automated vehicles", "s"),
+    "driver_delay_s": MetricLabel("delay of drivers", "s"),
     "fuel_l": MetricLabel("fuel", "l"),
     "fuel_ml": MetricLabel("fuel", "ml/vehicle"),
     "vehicles_mainline": MetricLabel("mainline vehicles", digits=0),

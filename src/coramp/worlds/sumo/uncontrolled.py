@@ -20,7 +20,7 @@ from coramp.strategies.base import Decider, is_metered, period_of, steps_of_peri
 from coramp.worlds.outcomes import cap_step_of, step_after
 from coramp.worlds.sumo.as_driven import outcome_as_driven
 from coramp.worlds.sumo.careless import Careless, CarelessDrivers
-from coramp.worlds.sumo.demand import Automated, driver_routes
+from coramp.worlds.sumo.demand import KRAUSS, Automated, driver_routes
 from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
 from coramp.worlds.sumo.metering import Meter, loops
 from coramp.worlds.sumo.network import driver_road_plan
@@ -31,6 +31,8 @@ from coramp.worlds.telling import reports_of_samples
 
 LEAST_TAU_S = 0.1
 """The least time gap that SUMO's Krauss model keeps free of collisions: one step."""
+AUTOMATION_MODELS = {"acc": 'carFollowModel="ACC"', "cacc": 'carFollowModel="CACC"'}
+"""By ``traffic.automation``, where it is not Krauss."""
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
 
@@ -97,19 +99,22 @@ def alone_among_drivers(
 ) -> Automated | None:
     """Returns the automated vehicles that nobody coordinates, None where there are none.
 
-    SUMO's Krauss model drives them without imperfection, at the gaps of ``[safety]``.
+    SUMO drives them as ``traffic.automation`` says, at the gaps of ``[safety]``. Where no share is
+    given, all have drivers.
     """
-    if not scenario.is_mixed:
+    if not scenario.gives_shares:
         return None
     vehicles = automated_of(scenario, arrivals, seed)
     if not vehicles.any():
         return None
-    yields = 1.0 if scenario.traffic.automation == "yielding" else 0.0
+    automation = scenario.traffic.automation
+    yields = 0.0 if automation == "not-yielding" else 1.0
     return Automated(
         vehicles,
         max(scenario.safety.time_gap_s, LEAST_TAU_S),
         scenario.safety.standstill_gap_m,
         f'lcCooperative="{yields!r}"',
+        AUTOMATION_MODELS.get(automation, KRAUSS),
     )
 
 
