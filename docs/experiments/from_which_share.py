@@ -37,7 +37,8 @@ def main(folder: str) -> None:
     def written(found: re.Match[str]) -> str:
         asked = found[1]
         if asked == "runs":
-            text = f"The figures below are those of {good.height} runs with {seeds} seeds."
+            every = "one seed" if seeds == 1 else f"{seeds} seeds"
+            text = f"The tables are those of {good.height} runs of 900 s with {every}."
         else:
             text = chosen(study.tables, asked.removeprefix("table: "))
         return f"<!-- {asked} -->\n{text}\n\n<!-- end -->"
