@@ -31,6 +31,7 @@ def test_what_the_design_promises_is_built_in():
         "drivers",
         "worth",
         "motorway",
+        "penetration",
     } <= set(builtin_names("studies"))
     assert "example" in builtin_names("snapshots")
     assert list(strategies()) == [

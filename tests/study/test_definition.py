@@ -272,3 +272,29 @@ def test_a_run_is_a_value():
     assert isinstance(one, RunSpec)
     with pytest.raises(AttributeError):
         one.seed = 6
+
+
+def test_drivers_are_those_beside_a_mixed_strategy_and_nobody_s_where_all_are_automated(tmp_path):
+    specs = specs_of(
+        tmp_path,
+        grid(
+            'strategies = ["mixed-slots", "slots", "uncontrolled"]\n'
+            'drivers = ["fair", "credible"]\n'
+            'flows_veh_h = [[1200, 300]]\nset = { "traffic.automated_share" = [1.0] }'
+        ),
+    )
+    assert [(s.strategy, s.drivers) for s in specs] == [
+        ("mixed-slots", None),
+        ("slots", None),
+        ("uncontrolled", "credible"),
+        ("uncontrolled", "fair"),
+    ]
+    specs = specs_of(
+        tmp_path,
+        grid(
+            'strategies = ["mixed-slots"]\ndrivers = ["fair", "credible"]\n'
+            'flows_veh_h = [[1200, 300]]\nset = { "traffic.automated_share" = [0.5, 1.0] }'
+        ),
+    )
+    found = [(s.drivers, s.scenario.traffic.automated_share) for s in specs]
+    assert found == [(None, 1.0), ("credible", 0.5), ("fair", 0.5)]

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from coramp.studies.statistics import Estimate, estimate, improvement_rate
+from coramp.studies.statistics import Estimate, estimate, improvement_rate, ratio_of_sums
 from coramp.studies.summary import (
     largest,
     overview,
@@ -186,3 +186,22 @@ def test_a_study_with_little_to_tell_still_has_its_tables(layout, runs):
     for table in tables:
         assert all(len(row) == len(table.columns) for row in table.rows)
         assert "nan" not in table.to_markdown()
+
+
+def test_a_ratio_of_sums_has_the_interval_of_a_ratio_estimator():
+    # R = 15 / 30; residuals 1 and -1 with t = 12.7062 and s = sqrt(2), over the mean of 15
+    found = ratio_of_sums([6.0, 9.0], [10.0, 20.0])
+    assert found == pytest.approx((0.5, 12.7062 / 15.0, 2), rel=1e-5)
+
+
+@given(values)
+def test_what_is_in_proportion_has_a_ratio_without_doubt(numbers):
+    over = [abs(number) + 1.0 for number in numbers]
+    found = ratio_of_sums([3.0 * number for number in over], over)
+    assert found.mean == pytest.approx(3.0)
+    assert found.half_width == pytest.approx(0.0, abs=1e-9)
+
+
+def test_there_is_no_ratio_over_nothing():
+    assert math.isnan(ratio_of_sums([1.0, 2.0], [0.0, 0.0]).mean)
+    assert math.isnan(ratio_of_sums([], []).mean)

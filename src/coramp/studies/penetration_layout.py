@@ -130,9 +130,11 @@ def _drivers_gain_from(series: Series) -> str:
 
 
 def _unbroken_from(series: Series) -> str:
+    """Where drivers alone have no breakdown, and automated vehicles bring some, that is said."""
     if not series.without.broken and not any(cell.broken for cell in series.cells):
         return "0 %"
-    return _share(series.pays_from(lambda cell: not cell.broken))
+    found = _share(series.pays_from(lambda cell: not cell.broken))
+    return found if series.without.broken else f"{found}, and at 0 %"
 
 
 def _share(share: float | None) -> str:

@@ -189,15 +189,13 @@ def _vehicles(run: Run) -> Vehicles:
 def _told_apart(run: Run) -> dict[str, Any]:
     """A row with its share, gap and automation, and its figures by kind where all are of one."""
     said = overrides_of(run)
-    share = said.get(SHARE, _of_scenario(run["scenario"], SHARE))
+    share, time_gap_s, automation = (
+        said[key] if key in said else _of_scenario(run["scenario"], key)
+        for key in (SHARE, TIME_GAP, AUTOMATION)
+    )
     if share is None:
         share = 0.0 if run["strategy"] == ALONE else 1.0
-    told = {
-        **run,
-        "share": share,
-        "time_gap_s": said.get(TIME_GAP, _of_scenario(run["scenario"], TIME_GAP)),
-        "automation": said.get(AUTOMATION, _of_scenario(run["scenario"], AUTOMATION)),
-    }
+    told = {**run, "share": share, "time_gap_s": time_gap_s, "automation": automation}
     if share in ALL_OF_A_KIND and run["automated_vehicles"] is None:
         there, nobody = ALL_OF_A_KIND[share]
         told.update({f"{there}_{figure}": run[figure] for figure in KINDS})

@@ -67,8 +67,8 @@ def _usual(at: pl.DataFrame) -> str | None:
     who = pl.struct("strategy", "drivers").n_unique().alias("who")
     counted = at.group_by("overrides", maintain_order=True).agg(who)
     most = counted.filter(pl.col("who") == pl.col("who").max())["overrides"].sort()
-    usual: str | None = most[(len(most) - 1) // 2]
-    return usual
+    found: str | None = most[(len(most) - 1) // 2]
+    return found
 
 
 def _shown_drivers(at: pl.DataFrame) -> tuple[str, ...]:
