@@ -36,6 +36,15 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
         )
 
 
+def check_messages_kept(is_mixed: bool) -> None:
+    """Raises CorampError where messages are to be kept of a run that has none."""
+    if is_mixed:
+        raise CorampError(
+            "--keep-messages: automated vehicles among drivers keep no messages yet; "
+            "leave it out, or choose automated shares of 1"
+        )
+
+
 def _among_drivers(strategy: type[Strategy]) -> bool:
     return not strategy.cooperative or coordinates_drivers(strategy)
 

@@ -54,6 +54,21 @@ LABELS: dict[str, MetricLabel] = {
     "hard_brakings_4_5": MetricLabel("brakings beyond 4.5 m/s2", digits=0),
     "stops": MetricLabel("vehicles that stopped on their way", digits=0),
     "plan_error_m": MetricLabel("largest difference between plan and SUMO", "m", 4),
+    "automated_vehicles": MetricLabel("automated vehicles", digits=0),
+    "automated_delay_s": MetricLabel("delay of automated vehicles", "s"),
+    "driver_delay_s": MetricLabel("delay of drivers", "s"),
+    "automated_hard_brakings_3": MetricLabel(
+        "brakings of automated vehicles beyond 3 m/s2", digits=0
+    ),
+    "driver_hard_brakings_3": MetricLabel("brakings of drivers beyond 3 m/s2", digits=0),
+    "ramp_stops": MetricLabel("ramp vehicles that stopped", digits=0),
+    "collisions_by_automated": MetricLabel("collisions that automated vehicles caused", digits=0),
+    "collisions_by_driver": MetricLabel(
+        "collisions of automated vehicles that drivers caused", digits=0
+    ),
+    "collisions_among_drivers": MetricLabel("collisions among drivers", digits=0),
+    "broken_assumptions": MetricLabel("assumptions that drivers broke", digits=0),
+    "automated_violations": MetricLabel("pairs nearer than automated vehicles promise", digits=0),
     "interventions": MetricLabel("unsafe commands that were replaced", digits=0),
     "adjusted_vehicles": MetricLabel("vehicles adjusted for others", digits=0),
     "planning_ms": MetricLabel("planning", "ms", 3),

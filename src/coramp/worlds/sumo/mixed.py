@@ -64,8 +64,8 @@ def gaps_of(scenario: Scenario, drivers: DriverPopulation) -> Gaps:
 def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     """Returns what automated vehicles keep on board on this road, commanded once a period.
 
-    They react no sooner than their next command. Drivers move in Euler steps, in which one that brakes from v comes to a stand v h / 2 earlier
-    than by v^2 / (2 b).
+    They react no sooner than their next command. Drivers move in Euler steps, in which one that
+    brakes from v comes to a stand v h / 2 earlier than by v^2 / (2 b).
     """
     law = SafetyLaw()
     shorter_m = 0.5 * scenario.mainline.limit_mps * scenario.control.step_s
