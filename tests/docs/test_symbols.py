@@ -43,6 +43,7 @@ FILES = {
     "attempts.parquet": schemas.ATTEMPTS,
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
+    "safety_events.parquet": schemas.SAFETY_EVENTS,
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
 }
