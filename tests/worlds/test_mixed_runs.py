@@ -327,3 +327,21 @@ def test_automated_vehicles_that_nobody_coordinates_are_told_nothing(told):
     )
     assert told == {}
     assert row["automated_vehicles"] == tables.outcome.passages.automated.sum() > 0
+
+
+def test_automated_vehicles_that_nobody_coordinates_promise_nothing():
+    run = coramp.run(
+        "paper",
+        "uncontrolled",
+        mainline_veh_h=1800.0,
+        ramp_veh_h=500.0,
+        seed=3,
+        horizon_s=120.0,
+        overrides={
+            "traffic.automated_share": 0.5,
+            "traffic.automation": "not-yielding",
+            "safety.time_gap_s": 0.8,
+        },
+    )
+    assert run.summary["automated_violations"] > 0
+    assert run.broken_promises == []

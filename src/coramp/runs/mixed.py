@@ -50,7 +50,13 @@ def _among_drivers(strategy: type[Strategy]) -> bool:
 
 
 def broken_among_drivers(row: Mapping[str, Any]) -> list[str]:
-    """Returns in words what automated vehicles among drivers promised and did not keep."""
+    """Returns in words what automated vehicles among drivers promised and did not keep.
+
+    Those that nobody coordinates promise nothing.
+    """
+    strategy = strategies().get(row["strategy"])
+    if strategy is not None and not strategy.cooperative:
+        return []
     broken = []
     if row.get("collisions_by_automated"):
         broken.append(f"{row['collisions_by_automated']} collisions that automated vehicles caused")
