@@ -54,7 +54,7 @@ def broken_among_drivers(row: Mapping[str, Any]) -> list[str]:
 
     Those that nobody coordinates promise nothing.
     """
-    strategy = strategies().get(row["strategy"])
+    strategy = strategies().get(row.get("strategy") or "")
     if strategy is not None and not strategy.cooperative:
         return []
     broken = []
