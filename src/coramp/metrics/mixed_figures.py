@@ -3,7 +3,7 @@
 import numpy as np
 import polars as pl
 
-from coramp._kernel import BoolArray, FloatArray
+from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.checker.among_drivers import (
     AMONG_DRIVERS,
     BY_AUTOMATED,
@@ -14,7 +14,7 @@ from coramp.checker.among_drivers import (
     findings_of,
 )
 from coramp.metrics.frames import frame_of
-from coramp.metrics.motion import hard_brakings, stopped_vehicles
+from coramp.metrics.motion import distance_of_each_m, hard_brakings, stopped_vehicles
 from coramp.mixed.laws import SafetyLaw
 from coramp.records.outcome import Outcome, Pieces
 from coramp.records.schemas import MIXED_METRICS, SAFETY_EVENTS, Row
@@ -23,6 +23,8 @@ from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 
 HARD_MPS2 = 3.0
+NOBODY = -1
+MESSAGES_OF_AIR = ("reports_sent", "reports_lost", "commands_sent", "commands_lost", "fallbacks")
 NEARER = "automated nearer than promised"
 
 
@@ -45,6 +47,8 @@ def mixed_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> 
         "collisions_among_drivers": causes.count(AMONG_DRIVERS),
         "broken_assumptions": len(found.broken),
         "automated_violations": len(found.unkept),
+        **{name: outcome.messages_of_air.get(name) for name in MESSAGES_OF_AIR},
+        "vehicle_km": float(distance_of_each_m(*_driven(outcome)).sum()) / 1000.0,
     }
 
 
@@ -80,6 +84,7 @@ def safety_events(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
     events = [(c.time_s, f"collision {c.cause}", c.rear, c.front) for c in found.collisions]
     events += [(b.time_s, f"driver {b.what}", b.rear, b.front) for b in found.broken]
     events += [(time_s, NEARER, rear, front) for time_s, rear, front in found.unkept]
+    events += [(time_s, what, place, NOBODY) for time_s, what, place in outcome.world_events]
     events.sort()
     names = outcome.passages.vehicle_id
     return frame_of(
@@ -87,7 +92,7 @@ def safety_events(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
         time_s=[event[0] for event in events],
         event=[event[1] for event in events],
         rear_vehicle_id=[names[event[2]] for event in events],
-        front_vehicle_id=[names[event[3]] for event in events],
+        front_vehicle_id=[names[event[3]] if event[3] >= 0 else None for event in events],
     )
 
 
@@ -106,6 +111,10 @@ def _of(pieces: Pieces, chosen: BoolArray) -> Pieces:
 def _hard_brakings(outcome: Outcome, chosen: BoolArray) -> int:
     own = _of(outcome.driven, chosen)
     return int(hard_brakings(own.first, own.rows, outcome.until_s, HARD_MPS2))
+
+
+def _driven(outcome: Outcome) -> tuple[IntArray, FloatArray, FloatArray]:
+    return outcome.driven.first, outcome.driven.rows, outcome.until_s
 
 
 def _ramp_stops(outcome: Outcome, scenario: Scenario) -> int:

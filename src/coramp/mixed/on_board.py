@@ -29,6 +29,17 @@ REAR_BRAKES_MPS2 = 2.0
 """What a lane change may ask of an automated vehicle behind before its next command."""
 
 
+class Ahead(NamedTuple):
+    """Where each vehicle will be when a command given now begins to act, ``delay_s`` later.
+
+    ``way_m`` is how far it goes until then, ``speed_mps`` its speed then.
+    """
+
+    way_m: FloatArray
+    speed_mps: FloatArray
+    delay_s: float
+
+
 class Neighbours(NamedTuple):
     """Who is ahead in one's lane, and beside a vehicle on the acceleration lane: -1 for nobody."""
 
@@ -82,6 +93,7 @@ def may_change_lane(
     users: RoadUsers,
     own: int,
     around: Neighbours,
+    ahead: Ahead,
     gaps: Gaps,
     following: FollowingLaw,
     law: SafetyLaw,
@@ -89,7 +101,8 @@ def may_change_lane(
     """Returns whether a lane change of a vehicle on the acceleration lane keeps all distances.
 
     Its own to the vehicle in front; that of an automated vehicle behind, which may have to brake at
-    2 m/s2; and, of a driver behind, what he would keep and braking in comfort takes.
+    2 m/s2; and, of a driver behind, what he would keep and braking in comfort takes:
+    s_0 + T v_Y + (v_Y^2 - v^2) / (2 b).
     """
     if users.on_mainline[own] or users.station_m[own] < READY_M:
         return False
@@ -98,54 +111,79 @@ def may_change_lane(
     gentle_mps2 = law.gentle_mps2 + law.gentle_at_end_mps2 * share * share
     if front >= 0:
         free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
-        keeps_mps = distance_speed_mps(
-            free_m, speed_mps, users.speed_mps[front], users.braking_mps2[own], law
-        )
-        if free_m < TOUCHING_M or keeps_mps < speed_mps:
+        spare_mps = _keeps_mps(users, own, front, ahead, law) - ahead.speed_mps[own]
+        if free_m < TOUCHING_M or spare_mps < 0.0:
             return False
-        if _follows_mps2(users, own, front, free_m, gaps, following) < -gentle_mps2:
+        if _follows_mps2(users, own, front, ahead, gaps, following) < -gentle_mps2:
             return False
     if rear < 0:
         return True
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        braking_m = (rear_mps**2 - speed_mps**2) / (2.0 * law.driver_mps2)
+        slower_mps = min(speed_mps, ahead.speed_mps[own])
+        braking_m = (rear_mps**2 - slower_mps**2) / (2.0 * law.driver_mps2)
         needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
         return bool(free_m >= max(TOUCHING_M, needs_m))
-    keeps_mps = distance_speed_mps(free_m, rear_mps, speed_mps, users.braking_mps2[rear], law)
-    if free_m < TOUCHING_M or keeps_mps < rear_mps - REAR_BRAKES_MPS2 * law.reaction_s:
+    spare_mps = _keeps_mps(users, rear, own, ahead, law) - ahead.speed_mps[rear]
+    if free_m < TOUCHING_M or spare_mps < -REAR_BRAKES_MPS2 * law.reaction_s:
         return False
-    return bool(_follows_mps2(users, rear, own, free_m, gaps, following) >= -gentle_mps2)
+    return bool(_follows_mps2(users, rear, own, ahead, gaps, following) >= -gentle_mps2)
+
+
+@kernel
+def _keeps_mps(users: RoadUsers, own: int, front: int, ahead: Ahead, law: SafetyLaw) -> float:
+    """The largest speed after the reaction time that keeps the distance to a vehicle in front.
+
+    The way until a command acts is gone by then; the leader brakes from now on.
+    """
+    free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
+    return distance_speed_mps(
+        free_m - ahead.way_m[own],
+        ahead.speed_mps[own],
+        users.speed_mps[front],
+        users.braking_mps2[own],
+        law,
+    )
 
 
 @kernel
 def _follows_mps2(
-    users: RoadUsers, own: int, front: int, free_m: float, gaps: Gaps, law: FollowingLaw
+    users: RoadUsers, own: int, front: int, ahead: Ahead, gaps: Gaps, law: FollowingLaw
 ) -> float:
-    """The linear law behind a vehicle in the same lane, or one that is about to be in it."""
-    speed_mps = users.speed_mps[own]
+    """The linear law behind a vehicle in the same lane, or one that is about to be in it.
+
+    It holds for when a command acts; the leader is taken to keep its speed until then.
+    """
+    speed_mps, front_mps = ahead.speed_mps[own], users.speed_mps[front]
+    free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
+    free_m += front_mps * ahead.delay_s - ahead.way_m[own]
     error_m = free_m - gap_m(True, users.automated[front], speed_mps, gaps)
-    closing_mps = users.speed_mps[front] - speed_mps
-    return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * closing_mps)
+    return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * (front_mps - speed_mps))
 
 
 @kernel
 def _behind_mps2(
-    users: RoadUsers, own: int, front: int, gaps: Gaps, following: FollowingLaw, law: SafetyLaw
+    users: RoadUsers,
+    own: int,
+    front: int,
+    ahead: Ahead,
+    gaps: Gaps,
+    following: FollowingLaw,
+    law: SafetyLaw,
 ) -> float:
     """The largest acceleration (m/s2) behind a vehicle: by the linear law, and never too near."""
-    free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
-    speed_mps, braking_mps2 = users.speed_mps[own], users.braking_mps2[own]
-    keeps_mps = distance_speed_mps(free_m, speed_mps, users.speed_mps[front], braking_mps2, law)
-    wanted_mps2 = max(-braking_mps2, _follows_mps2(users, own, front, free_m, gaps, following))
-    return float(min(wanted_mps2, (keeps_mps - speed_mps) / law.reaction_s))
+    wanted_mps2 = _follows_mps2(users, own, front, ahead, gaps, following)
+    keeps_mps = _keeps_mps(users, own, front, ahead, law)
+    safe_mps2 = (keeps_mps - ahead.speed_mps[own]) / law.reaction_s
+    return float(min(max(-users.braking_mps2[own], wanted_mps2), safe_mps2))
 
 
 @kernel
 def driven_mps2(
     users: RoadUsers,
     around: Neighbours,
+    ahead: Ahead,
     told_mps2: FloatArray,
     changes: BoolArray,
     gaps: Gaps,
@@ -163,21 +201,23 @@ def driven_mps2(
     for own in range(len(users.number)):
         if not users.automated[own]:
             continue
-        accel = min(told_mps2[own], _alone_mps2(users, own, following, law, road, period_s))
+        accel = min(told_mps2[own], _alone_mps2(users, own, ahead, following, law, road, period_s))
         if around.leader[own] >= 0:
-            accel = min(accel, _behind_mps2(users, own, around.leader[own], gaps, following, law))
+            leader = around.leader[own]
+            accel = min(accel, _behind_mps2(users, own, leader, ahead, gaps, following, law))
         if changes[own] and around.front[own] >= 0:
-            accel = min(accel, _behind_mps2(users, own, around.front[own], gaps, following, law))
+            front = around.front[own]
+            accel = min(accel, _behind_mps2(users, own, front, ahead, gaps, following, law))
         accel_mps2[own] = accel
     for own in range(len(users.number)):
         rear = around.rear[own]
         if changes[own] and rear >= 0 and users.automated[rear]:
-            behind_mps2 = _behind_mps2(users, rear, own, gaps, following, law)
+            behind_mps2 = _behind_mps2(users, rear, own, ahead, gaps, following, law)
             accel_mps2[rear] = min(accel_mps2[rear], behind_mps2)
     for own in range(len(users.number)):
-        speed_mps = users.speed_mps[own]
         accel = max(-law.hardest_mps2, accel_mps2[own])
-        accel_mps2[own] = max(-speed_mps / period_s, accel) if users.automated[own] else 0.0
+        stops_mps2 = -ahead.speed_mps[own] / period_s
+        accel_mps2[own] = max(stops_mps2, accel) if users.automated[own] else 0.0
     return accel_mps2
 
 
@@ -185,13 +225,14 @@ def driven_mps2(
 def _alone_mps2(
     users: RoadUsers,
     own: int,
+    ahead: Ahead,
     following: FollowingLaw,
     law: SafetyLaw,
     road: MixedRoad,
     period_s: float,
 ) -> float:
     """Towards the speed that it wishes, and to a stop before the acceleration lane ends."""
-    station_m, speed_mps = users.station_m[own], users.speed_mps[own]
+    station_m, speed_mps = users.station_m[own] + ahead.way_m[own], ahead.speed_mps[own]
     able_mps2 = min(users.acceleration_mps2[own], users.power_wpkg[own] / max(speed_mps, 0.1))
     if users.on_mainline[own]:
         wish_mps, up_mps2 = users.cruise_mps[own], min(able_mps2, following.speed_up_mps2)

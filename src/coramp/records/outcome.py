@@ -1,5 +1,6 @@
 """What a run leaves behind in memory: who passed, how they drove, what was decided."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,7 +66,9 @@ class Outcome:
     when, as driven. ``end_s`` is when the run ended or was cut off. Decisions name vehicles by rows
     of the ledger; ``vehicle_of_row`` gives their places in ``passages``. ``told`` are the messages,
     where they were to be kept. ``drivers`` names their population; ``collided`` are those whom the
-    simulator saw collide: time (s), places of rear and front vehicle. Both are for mixed traffic.
+    simulator saw collide: time (s), places of rear and front vehicle. ``messages_of_air``
+    counts messages and fallbacks; ``world_events`` are what happened by itself: time (s), what, and
+    the vehicle's place. All four are for mixed traffic.
     """
 
     cooperative: bool
@@ -83,6 +86,8 @@ class Outcome:
     told: Told | None = None
     drivers: str = ""
     collided: tuple[tuple[float, int, int], ...] = ()
+    messages_of_air: Mapping[str, int] = field(default_factory=dict)
+    world_events: tuple[tuple[float, str, int], ...] = ()
 
     @property
     def until_s(self) -> FloatArray:

@@ -203,6 +203,12 @@ MIXED_METRICS: Schema = {
     "collisions_among_drivers": pl.Int64,
     "broken_assumptions": pl.Int64,
     "automated_violations": pl.Int64,
+    "reports_sent": pl.Int64,
+    "reports_lost": pl.Int64,
+    "commands_sent": pl.Int64,
+    "commands_lost": pl.Int64,
+    "fallbacks": pl.Int64,
+    "vehicle_km": pl.Float64,
 }
 """Figures of automated vehicles among drivers, null in other runs."""
 

@@ -172,6 +172,16 @@ class StudyPlots:
 
         return baseline_figure(self._drawn("baseline"))
 
+    def plot_penetration(self) -> "Figure":
+        """Returns delay (s) and hard braking over the share (%) of automated vehicles, by demand.
+
+        Raises CorampError for a study whose layout is not ``penetration``, and where no run went
+        well.
+        """
+        from coramp.report.penetration_figure import penetration_figure
+
+        return penetration_figure(self._drawn("penetration"))
+
     def _drawn(self, layout: str) -> pl.DataFrame:
         """The runs that went well, of a study that has this layout."""
         if self.layout != layout:

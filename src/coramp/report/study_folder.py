@@ -14,7 +14,7 @@ from coramp.records.stored_checks import checked_frame, first_of
 from coramp.studies.definition import Study
 from coramp.studies.store import MARK, Store
 
-DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline")
+DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline", "penetration")
 """The layouts of studies that there are figures of."""
 
 

@@ -75,6 +75,7 @@ COOPERATIVE = {
     "virtual-platoon": Look("virtual platoon", BLACK, "s", "-."),
     "ocbf": Look("OCBF", GREY, "*", "--"),
     "slots": Look("slots", VERMILION, "o", "-"),
+    "mixed-slots": Look("mixed slots", GREEN, "o", "-"),
 }
 METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
 METERED_MARKER = "H"

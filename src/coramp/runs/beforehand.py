@@ -51,7 +51,7 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
 
 def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
     """Returns in a line which settings of runs with drivers bind no driver, or None."""
-    of_drivers = [s for s in specs if s.drivers is not None and not s.scenario.is_mixed]
+    of_drivers = [s for s in specs if s.drivers is not None and not s.scenario.gives_shares]
     found = of_automation([dict(spec.overrides) for spec in of_drivers])
     if not found:
         return None

@@ -5,6 +5,7 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.world_sections import TABLES
 from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
@@ -17,16 +18,13 @@ def coordinates_drivers(strategy: type[Strategy]) -> bool:
 
 def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, population: str) -> None:
     """Raises CorampError if a strategy, an engine or drivers cannot be those of mixed traffic."""
+    why, instead = _asked_for(scenario)
     if engine != "sumo":
-        raise CorampError(
-            f"engine: {engine} has no drivers, and [traffic] leaves some vehicles to them; "
-            "choose sumo, or automated shares of 1"
-        )
+        raise CorampError(f"engine: {engine} cannot do that {why}; choose sumo, or {instead}")
     if strategy.cooperative and not coordinates_drivers(strategy):
         able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
         raise CorampError(
-            f"strategy: {strategy.name} cannot plan among drivers, and [traffic] leaves some "
-            f"vehicles to them; allowed are {able}, or automated shares of 1"
+            f"strategy: {strategy.name} cannot do that {why}; allowed are {able}, or {instead}"
         )
     integrator = scenario.drivers[population].integrator
     if scenario.has_automated and integrator != "euler":
@@ -45,6 +43,14 @@ def check_messages_kept(is_mixed: bool) -> None:
         )
 
 
+def _asked_for(scenario: Scenario) -> tuple[str, str]:
+    """What is asked of a run that not all can do, and what to ask for instead."""
+    if scenario.is_mixed:
+        return "[traffic] leaves some vehicles to drivers", "automated shares of 1"
+    tables = ", ".join(f"[{t}]" for t in TABLES if not getattr(scenario, t).is_perfect)
+    return f"the world is not perfect ({tables})", "none of these tables"
+
+
 def _among_drivers(strategy: type[Strategy]) -> bool:
     return not strategy.cooperative or coordinates_drivers(strategy)
 
@@ -52,10 +58,9 @@ def _among_drivers(strategy: type[Strategy]) -> bool:
 def broken_among_drivers(row: Mapping[str, Any]) -> list[str]:
     """Returns in words what automated vehicles among drivers promised and did not keep.
 
-    Those that nobody coordinates promise nothing.
+    Those that nobody coordinates, and that so have no plan to be off, promise nothing.
     """
-    strategy = strategies().get(row.get("strategy") or "")
-    if strategy is not None and not strategy.cooperative:
+    if row.get("plan_error_m") is None:
         return []
     broken = []
     if row.get("collisions_by_automated"):

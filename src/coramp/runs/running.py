@@ -93,7 +93,8 @@ class RunSpec:
     def is_mixed(self) -> bool:
         """Whether a strategy coordinates automated vehicles among drivers."""
         coordinates = strategy_named(self.strategy).cooperative
-        return coordinates and self.scenario.is_mixed and self.scenario.has_automated
+        other = self.scenario.is_mixed or self.scenario.has_faults
+        return coordinates and other and self.scenario.has_automated
 
     @property
     def settings(self) -> str | None:
@@ -153,9 +154,10 @@ def make_spec(
     if is_metered(chosen) and loaded.signal_problem:
         raise CorampError(loaded.signal_problem)
     population = None
-    if drivers is not None or not chosen.cooperative or loaded.is_mixed:
+    among_drivers = loaded.is_mixed or loaded.has_faults
+    if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
-    if loaded.is_mixed:
+    if among_drivers or (loaded.gives_shares and not chosen.cooperative):
         check_mixed(loaded, chosen, engine, population or "")
     elif chosen.cooperative:
         population = None

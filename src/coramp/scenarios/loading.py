@@ -9,6 +9,7 @@ from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
+from coramp.scenarios.world_sections import with_preset
 
 
 def load_scenario(
@@ -28,6 +29,7 @@ def load_scenario(
     overrides, blamed = overrides_in_mps(overrides, blamed)
     data = with_populations(data)
     data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
+    data = with_preset(data)
     data = with_defaults(with_listed_flows(data, label, blamed), label)
     return validated(Scenario, data, label, {**in_kmh, **blamed})
 

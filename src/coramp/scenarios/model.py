@@ -35,6 +35,18 @@ from coramp.scenarios.sections import (
 )
 from coramp.scenarios.stations import chosen_decision_station_m
 from coramp.scenarios.vehicle_types import VehicleType
+from coramp.scenarios.world_sections import (
+    TABLES,
+    Actuators,
+    Behaviour,
+    Clock,
+    CommandLink,
+    Incidents,
+    Positioning,
+    ReportLink,
+    RoadSurface,
+    World,
+)
 from coramp.strategies.parameters import Value
 from coramp.vehicles.traits import CAR, Traits
 
@@ -70,6 +82,15 @@ class Scenario(Model):
     arrivals: Annotated[tuple[ExplicitArrival, ...], Field(strict=False)] = ()
     strategy: dict[str, dict[str, Value]] = Field(default_factory=dict)
     traffic: TrafficMix = TrafficMix()
+    world: World = World()
+    positioning: Positioning = Positioning()
+    clock: Clock = Clock()
+    reports: ReportLink = ReportLink()
+    commands: CommandLink = CommandLink()
+    actuators: Actuators = Actuators()
+    road: RoadSurface = RoadSurface()
+    behaviour: Behaviour = Behaviour()
+    incidents: Incidents = Incidents()
 
     @field_validator("strategy", mode="before")
     @classmethod
@@ -115,10 +136,21 @@ class Scenario(Model):
         return self.traffic.share_of(on_ramp) if own is None else own
 
     @property
+    def gives_shares(self) -> bool:
+        """Whether it says which share is automated: of all vehicles, of a stream or of a type."""
+        of_types = (kind.automated_share is not None for kind in self.vehicle_types)
+        return self.traffic.gives_shares or any(of_types)
+
+    @property
     def is_mixed(self) -> bool:
         """Whether some vehicle of this scenario may have a driver."""
         kinds = [(kind.name, ramp) for kind in self.vehicle_types for ramp in (False, True)]
         return any(self.automated_share_of(*kind) < 1.0 for kind in kinds)
+
+    @property
+    def has_faults(self) -> bool:
+        """Whether the world of this scenario is not perfect."""
+        return not all(getattr(self, table).is_perfect for table in TABLES)
 
     @property
     def has_automated(self) -> bool:

@@ -178,8 +178,9 @@ class TrafficMix(Model):
     ``automated_share`` holds for both streams; ``mainline_automated_share`` and
     ``ramp_automated_share`` for one; a type of vehicles may have its own. ``drivers`` names the
     population of the others, of whom ``connected_share`` tell the coordinator where they are.
-    ``automation`` is how automated vehicles drive that nobody coordinates, by SUMO's Krauss
-    without imperfection: whether they yield to who wants to change lanes.
+    ``automation`` is how automated vehicles drive that nobody coordinates: by SUMO's Krauss without
+    imperfection, which yields to who wants to change lanes or does not, or by its ACC or CACC,
+    which yield.
     """
 
     automated_share: SharePart | None = None
@@ -187,7 +188,17 @@ class TrafficMix(Model):
     ramp_automated_share: SharePart | None = None
     drivers: Annotated[str, Field(min_length=1)] = "fair"
     connected_share: SharePart = 1.0
-    automation: Literal["yielding", "not-yielding"] = "yielding"
+    automation: Literal["yielding", "not-yielding", "acc", "cacc"] = "yielding"
+
+    @property
+    def gives_shares(self) -> bool:
+        """Whether it says of any stream which share is automated."""
+        shares = (
+            self.automated_share,
+            self.mainline_automated_share,
+            self.ramp_automated_share,
+        )
+        return any(share is not None for share in shares)
 
     def share_of(self, on_ramp: bool) -> float:
         """Returns the automated share of a stream, 1 where nothing is said."""

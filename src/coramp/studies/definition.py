@@ -1,7 +1,7 @@
 """Studies: a grid of runs, as validated TOML."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Annotated, Any, Literal, Self
@@ -9,9 +9,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from coramp.errors import CorampError
+from coramp.runs.mixed import coordinates_drivers
 from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
 from coramp.scenarios.sections import Flow, Model
 from coramp.scenarios.toml_files import beside, read, validated
+from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategy_named
 
 Flows = Annotated[tuple[Flow, ...], Field(strict=False)]
@@ -25,7 +27,8 @@ class Grid(Model):
     Flows are those of ``mainline_veh_h`` by those of ``ramp_veh_h``, or the pairs of
     ``flows_veh_h``; left out, they are the scenario's own, or its listed arrivals.
     ``set`` gives lists of values for dotted keys of the scenario. ``drivers`` count only for
-    strategies that leave vehicles to their drivers, whose engine is always sumo.
+    strategies that leave vehicles to their drivers, whose engine is always sumo, and for those that
+    coordinate automated vehicles among drivers.
     """
 
     strategies: Names
@@ -114,7 +117,15 @@ class Study(Model):
     scenario: str
     seeds: Annotated[int, Field(ge=1, le=100000)] = 3
     layout: Literal[
-        "plain", "paper", "sensitivity", "capacity", "field", "baseline", "drivers", "worth"
+        "plain",
+        "paper",
+        "sensitivity",
+        "capacity",
+        "field",
+        "baseline",
+        "drivers",
+        "worth",
+        "penetration",
     ] = "plain"
     horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
     runs: Annotated[tuple[Grid, ...], Field(strict=False)] = ()
@@ -225,17 +236,27 @@ def variants(asked: Grid | Search) -> Iterator[dict[str, Any]]:
     """
     keys = sorted(asked.set)
     for strategy in asked.strategies:
-        cooperative = strategy_named(strategy).cooperative
-        for drivers, *values in product(
-            (None,) if cooperative else asked.drivers,
-            *(asked.set[key] for key in keys),
-        ):
-            yield {
-                "strategy": strategy,
-                "engine": asked.engine if cooperative else "sumo",
-                "drivers": drivers,
-                "overrides": dict(zip(keys, values, strict=True)),
-            }
+        chosen = strategy_named(strategy)
+        for values in product(*(asked.set[key] for key in keys)):
+            overrides = dict(zip(keys, values, strict=True))
+            for drivers in _populations(chosen, asked.drivers, overrides):
+                yield {
+                    "strategy": strategy,
+                    "engine": asked.engine if chosen.cooperative else "sumo",
+                    "drivers": drivers,
+                    "overrides": overrides,
+                }
+
+
+def _populations(
+    strategy: type[Strategy], drivers: Sequence[str], overrides: Mapping[str, Any]
+) -> Sequence[str | None]:
+    """The populations that are on the road beside a strategy's own vehicles: None for nobody."""
+    if not strategy.cooperative:
+        return drivers
+    shares = [value for key, value in overrides.items() if key.endswith("automated_share")]
+    some = any(share != 1.0 for share in shares)
+    return drivers if some and coordinates_drivers(strategy) else (None,)
 
 
 def count_runs(study: Study, seeds: int) -> int:

@@ -35,6 +35,8 @@ LABELS: dict[str, MetricLabel] = {
     "mainline_fcfs_delay_s": MetricLabel("mainline delay, first come first served", "s"),
     "ramp_fcfs_delay_s": MetricLabel("ramp delay, first come first served", "s"),
     "lane_limit_veh_h": MetricLabel("most that the lane carries", "veh/h", 0),
+    "automated_delay_s": MetricLabel("delay of automated vehicles", "s"),
+    "driver_delay_s": MetricLabel("delay of drivers", "s"),
     "fuel_l": MetricLabel("fuel", "l"),
     "fuel_ml": MetricLabel("fuel", "ml/vehicle"),
     "vehicles_mainline": MetricLabel("mainline vehicles", digits=0),
@@ -55,8 +57,6 @@ LABELS: dict[str, MetricLabel] = {
     "stops": MetricLabel("vehicles that stopped on their way", digits=0),
     "plan_error_m": MetricLabel("largest difference between plan and SUMO", "m", 4),
     "automated_vehicles": MetricLabel("automated vehicles", digits=0),
-    "automated_delay_s": MetricLabel("delay of automated vehicles", "s"),
-    "driver_delay_s": MetricLabel("delay of drivers", "s"),
     "automated_hard_brakings_3": MetricLabel(
         "brakings of automated vehicles beyond 3 m/s2", digits=0
     ),

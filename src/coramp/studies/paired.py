@@ -18,7 +18,7 @@ from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, with_interval
 
 DELAYS = ("delay_s", "mainline_delay_s", "ramp_delay_s")
-WITHOUT_ARRIVALS = ("safety.", "motion.", "strategy.", "drivers.")
+WITHOUT_ARRIVALS = ("safety.", "motion.", "strategy.", "drivers.", "traffic.")
 """Tables of a scenario that say nothing of who arrives."""
 WITHOUT_ARRIVALS_KEYS = frozenset(
     {"control.actuation_delay_s", "control.retry_s", "control.gap_position"}

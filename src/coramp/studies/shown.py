@@ -42,7 +42,8 @@ def shared_flows(good: pl.DataFrame) -> list[tuple[float, float]]:
 def shown_rows(good: pl.DataFrame) -> list[Row]:
     """Returns the rows of the runs that the report shows, in the order of the table.
 
-    They are those without overrides, or where every run has some, with the first that there are.
+    They are those without overrides, or where every run has some, with those with which there are
+    most strategies; of several such, those in the middle.
     """
     if good.is_empty():
         return []
@@ -51,7 +52,7 @@ def shown_rows(good: pl.DataFrame) -> list[Row]:
     for mainline, ramp in dict.fromkeys((flows[0], flows[-1])):
         at = plain(good).filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
         at = at.filter(pl.col("seed") == pl.col("seed").min())
-        at = at.filter(pl.col("overrides").eq_missing(pl.lit(at["overrides"][0], pl.String)))
+        at = at.filter(pl.col("overrides").eq_missing(pl.lit(_usual(at), pl.String)))
         shown = _shown_drivers(at)
         rows += [
             row
@@ -59,6 +60,15 @@ def shown_rows(good: pl.DataFrame) -> list[Row]:
             if row["drivers"] in (None, *shown)
         ]
     return rows
+
+
+def _usual(at: pl.DataFrame) -> str | None:
+    """The overrides with which there are most strategies; of several such, those in the middle."""
+    who = pl.struct("strategy", "drivers").n_unique().alias("who")
+    counted = at.group_by("overrides", maintain_order=True).agg(who)
+    most = counted.filter(pl.col("who") == pl.col("who").max())["overrides"].sort()
+    usual: str | None = most[(len(most) - 1) // 2]
+    return usual
 
 
 def _shown_drivers(at: pl.DataFrame) -> tuple[str, ...]:

@@ -38,3 +38,17 @@ def improvement_rate(controlled: float, uncontrolled: float) -> float:
     if uncontrolled == 0.0:
         raise ValueError("without a baseline delay there is no improvement rate")
     return 1.0 - controlled / uncontrolled
+
+
+def ratio_of_sums(values: Sequence[float], over: Sequence[float]) -> Estimate:
+    """Returns R = sum(x) / sum(y) of pairs, with its interval; nan where the y add up to 0.
+
+    The interval is that of a ratio estimator: Student's t by the standard error of the mean of
+    x - R y, over the mean of y. It keeps that x and y are of the same seed.
+    """
+    total = math.fsum(over)
+    if total == 0.0:
+        return Estimate(math.nan, math.nan, len(values))
+    ratio = math.fsum(values) / total
+    left = estimate([x - ratio * y for x, y in zip(values, over, strict=True)])
+    return Estimate(ratio, left.half_width * len(values) / total, len(values))

@@ -15,6 +15,7 @@ from coramp.studies.metric_labels import LABELS, SPEED, label_of
 from coramp.studies.overrides import overrides_of
 from coramp.studies.paired import paired_table
 from coramp.studies.paper_layout import paper_tables
+from coramp.studies.penetration_layout import penetration_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
 from coramp.studies.setting_words import settings_text
 from coramp.studies.speed_unit import MPS, SpeedUnit
@@ -29,6 +30,7 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "baseline": baseline_tables,
     "drivers": drivers_tables,
     "worth": worth_tables,
+    "penetration": penetration_tables,
 }
 MEANS = (
     *("delay_s", "delay_bound_s", "mainline_delay_s", "ramp_delay_s"),
@@ -95,8 +97,12 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
 
 
 def promises(runs: pl.DataFrame) -> Table:
-    """Returns what the cooperative runs promised, and kept or not, and how many runs failed."""
-    cooperative = runs.filter(pl.col("drivers").is_null() & (pl.col("status") == "ok"))
+    """Returns what the cooperative runs promised, and kept or not, and how many runs failed.
+
+    Runs among drivers are told apart, where there are any.
+    """
+    good = runs.filter(status="ok")
+    cooperative = good.filter(pl.col("drivers").is_null())
     broken = sum(bool(broken_promises(row)) for row in cooperative.iter_rows(named=True))
     margin_m = smallest(cooperative["min_margin_m"])
     error_m = largest(cooperative["plan_error_m"])
@@ -108,9 +114,25 @@ def promises(runs: pl.DataFrame) -> Table:
         (label_of("min_margin_m"), number(margin_m, 3)),
         (label_of("plan_error_m"), number(error_m, 4)),
         ("vehicles unserved", str(cooperative["unserved"].sum())),
+        *_among_drivers(good),
         ("failed runs", str(runs.filter(status="failed").height)),
     )
     return Table("Promises", ("what", "value"), rows)
+
+
+def _among_drivers(good: pl.DataFrame) -> list[tuple[str, str]]:
+    """What automated vehicles promised that a strategy coordinates among drivers."""
+    mixed = good.filter(pl.col("drivers").is_not_null() & pl.col("plan_error_m").is_not_null())
+    if mixed.is_empty():
+        return []
+    broken = sum(bool(broken_promises(row)) for row in mixed.iter_rows(named=True))
+    return [
+        ("runs coordinated among drivers", str(mixed.height)),
+        ("of these, runs that broke a promise", str(broken)),
+        ("collisions by automated vehicles", str(mixed["collisions_by_automated"].sum())),
+        ("collisions by drivers", str(mixed["collisions_by_driver"].sum())),
+        ("collisions among drivers", str(mixed["collisions_among_drivers"].sum())),
+    ]
 
 
 def of(group: pl.DataFrame, column: str) -> Estimate:

@@ -8,12 +8,14 @@ import polars as pl
 from coramp.report.style import look_of
 from coramp.studies.overrides import overrides_of, scenario_value
 from coramp.studies.paired import Cell, Difference, differences
+from coramp.studies.penetration_layout import pays_table, series_of
 from coramp.studies.setting_words import gaps_text, settings_text
 from coramp.studies.shown import SHOWN_DRIVERS, plain, shared_flows
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import with_interval
 
 MOST_SETTINGS = 6
+MOST_SHARES = 12
 
 
 class Answer(NamedTuple):
@@ -124,6 +126,30 @@ def layout_answer(good: pl.DataFrame) -> Answer:
         for (mainline_s, ramp_s), names in losing.items()
     )
     return Answer(_lead(at, mainline, ramp), items)
+
+
+def penetration_answer(good: pl.DataFrame) -> Answer | None:
+    """Returns from which share each strategy pays among which drivers, None where none was run."""
+    found = [series for series in series_of(good) if series.vehicles.coordinated]
+    if not found:
+        return None
+    rows = pays_table(found).rows
+    items = tuple(
+        (
+            f"{flow} veh/h, {drivers} drivers, {who} at {gap_s} s",
+            f"less delay for all {_from(everyone)}, for drivers {_from(own)}; no breakdown "
+            + _from(unbroken),
+        )
+        for drivers, flow, gap_s, who, everyone, own, unbroken in rows
+    )
+    lead = "The share of automated vehicles from which on coordination pays:"
+    more = len(items) - MOST_SHARES
+    rest = f"{more} more lines are in the tables." if more > 0 else ""
+    return Answer(lead, items[:MOST_SHARES], rest)
+
+
+def _from(share: str) -> str:
+    return share if share in ("nowhere", "-") else f"from {share}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -18,9 +18,15 @@ from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
-from coramp.report.page.study_answer import layout_answer, own_answer
+from coramp.report.page.study_answer import (
+    Answer,
+    layout_answer,
+    own_answer,
+    penetration_answer,
+)
 from coramp.report.page.study_repeat import another_setting, repeat_command, watched_text
 from coramp.report.page.svg import picture
+from coramp.report.penetration_figure import penetration_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
 from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.varied_figure import readable, varied_figure
@@ -50,6 +56,7 @@ DRAWN = {
         ("Every strategy on the same arrivals", field_figure),
     ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
+    "penetration": (("Delay and hard braking by share of automated vehicles", penetration_figure),),
 }
 MOST_VALUES = 6
 """Of a setting with more values the first and the last are told."""
@@ -78,11 +85,7 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         title=f"Report: study {study.name}",
         subtitle=study.description,
         asked=_asked(study, good, content, unit),
-        answer=(
-            own_answer(good, content["scenario"])
-            if study.layout == "plain"
-            else layout_answer(good)
-        ),
+        answer=_answer(study, good, content["scenario"]),
         notes=[*_notes(study, every, listed=_lists_arrivals(content)), *said],
         tables=[without_same(table) for table in summary_tables(study, every, unit)],
         pictures=[*pictures_of(study.layout, good, content["scenario"]), *over_time],
@@ -96,6 +99,14 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         runs=packs,
         cells=cells,
     )
+
+
+def _answer(study: Study, good: pl.DataFrame, scenario: Row) -> Answer:
+    """What the study says first."""
+    if study.layout == "plain":
+        return own_answer(good, scenario)
+    found = penetration_answer(good) if study.layout == "penetration" else None
+    return found or layout_answer(good)
 
 
 def _lists_arrivals(content: Row) -> bool:
@@ -168,8 +179,9 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
 
 def _without_effect(runs: pl.DataFrame) -> list[str]:
     """The settings of runs with drivers that bind coordinated vehicles only."""
-    of_drivers = runs.filter(pl.col("drivers").is_not_null()).iter_rows(named=True)
-    return of_automation([overrides_of(row) for row in of_drivers])
+    among_drivers = pl.col("drivers").is_not_null() & pl.col("automated_vehicles").is_null()
+    rows = runs.filter(among_drivers).iter_rows(named=True)
+    return of_automation([overrides_of(row) for row in rows])
 
 
 def _failed(runs: pl.DataFrame) -> Table | None:

@@ -11,6 +11,8 @@ from coramp.scenarios.sections import DriverPopulation, Vehicle
 from coramp.vehicles.traits import CAR
 from coramp.worlds.sumo.traits import DriverTraits
 
+KRAUSS = 'sigma="0"'
+"""SUMO's own model to follow by, without imperfection."""
 FASTEST_COMMAND_MPS = 100.0
 """The highest speed that a cooperative vehicle may be told; SUMO's own limit is 200 km/h."""
 PROFILE_MPS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
@@ -21,13 +23,15 @@ PROFILE_MPS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
 class Automated:
     """Who is automated, one entry an arrival, and how SUMO's drivers know such vehicles.
 
-    ``manners`` are further attributes of their types, on lane changes.
+    ``manners`` are further attributes of their types, on lane changes; ``model`` says by which
+    model they follow, Krauss without imperfection if left out.
     """
 
     vehicles: BoolArray
     tau_s: float
     min_gap_m: float
     manners: str
+    model: str = KRAUSS
 
 
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
@@ -117,8 +121,9 @@ def driver_routes(
             name += f"-{arrival.vehicle_id}"  # each draws a top speed of its own
         elif arrival.vehicle_type != CAR:
             name += f"-{arrival.vehicle_type}"
+        name += _carelessness_name(own)
         size = f'length="{arrival.length_m!r}" {_wish(drivers, wish_mps)}'
-        manners = f"{_manners(drivers, own.tau_s)}{_ability(drivers, arrival)}"
+        manners = f"{_manners(drivers, own)}{_ability(drivers, arrival)}"
         types[name] = f'  <vType id="{name}" {size} {manners}{_class(scenario, arrival)}/>'
         vehicles.append(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
@@ -132,7 +137,7 @@ def automated_cruise_mps(scenario: Scenario, arrival: Arrival) -> float:
 
 
 def _automated_type(scenario: Scenario, arrival: Arrival, automated: Automated) -> tuple[str, str]:
-    """Returns an automated vehicle's type in SUMO, by name and line: Krauss without imperfection.
+    """Returns an automated vehicle's type in SUMO, by name and line.
 
     Drivers judge gaps to it by its ``tau`` and ``minGap``, which are what it keeps.
     """
@@ -140,7 +145,7 @@ def _automated_type(scenario: Scenario, arrival: Arrival, automated: Automated) 
     name = f"automated-{arrival.vehicle_type}-{arrival.length_m!r}-{top_mps!r}"
     line = (
         f'  <vType id="{name}" length="{arrival.length_m!r}" maxSpeed="{top_mps!r}" '
-        f'speedFactor="1" speedDev="0" sigma="0" tau="{automated.tau_s!r}" '
+        f'speedFactor="1" speedDev="0" {automated.model} tau="{automated.tau_s!r}" '
         f'minGap="{automated.min_gap_m!r}" {automated.manners}'
         f"{_class(scenario, arrival)}/>"
     )
@@ -180,12 +185,19 @@ def _wish(drivers: DriverPopulation, wish_mps: float) -> str:
     return f'maxSpeed="{drivers.speed_factor.high * wish_mps!r}"'
 
 
-def _manners(drivers: DriverPopulation, tau_s: float) -> str:
+def _carelessness_name(own: DriverTraits) -> str:
+    never = "-never-yields" if own.never_yields else ""
+    return never if own.looks_each_s is None else f"{never}-looks-each-{own.looks_each_s:g}"
+
+
+def _manners(drivers: DriverPopulation, own: DriverTraits) -> str:
     model = drivers.car_following
+    yields = 0.0 if own.never_yields else drivers.lc_cooperative
+    looks = "" if own.looks_each_s is None else f' actionStepLength="{own.looks_each_s!r}"'
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (
-        f'{noise}tau="{tau_s!r}" '
-        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{drivers.lc_cooperative!r}"'
+        f'{noise}tau="{own.tau_s!r}" '
+        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{yields!r}"{looks}'
     )
 
 

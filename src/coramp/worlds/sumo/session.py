@@ -23,6 +23,8 @@ OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
+DRIVERS_CARE = 31
+"""Speed mode of a driver: with all checks."""
 DRIVERS_CHANGES = 1621
 """SUMO's own lane change mode: drivers yield to a vehicle that would like to change."""
 GREEN, YELLOW, RED = "G", "y", "r"
@@ -81,6 +83,18 @@ class Session:
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise CorampError(f"SUMO: {error}") from error
 
+    def step_on(self) -> None:
+        """Executes one step."""
+        try:
+            libsumo.simulationStep()
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise CorampError(f"SUMO: {error}") from error
+
+    def still_here(self, names: Sequence[str]) -> list[bool]:
+        """Returns which of these vehicles are on the road."""
+        here = set(libsumo.vehicle.getIDList())
+        return [name in here for name in names]
+
     def vehicles_left(self) -> int:
         """Returns how many vehicles drive or are still to enter."""
         return int(libsumo.simulation.getMinExpectedNumber())
@@ -107,13 +121,31 @@ class Session:
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
         libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
 
-    def judge_gaps_by(self, vehicle_id: str, tau_s: float) -> None:
-        """Sets the time gap by which SUMO judges gaps of a vehicle, its own and behind others."""
-        libsumo.vehicle.setTau(vehicle_id, tau_s)
+    def force(self, vehicle_id: str, speed_mps: float, time_s: float) -> None:
+        """Has a driver change to a speed, whatever is around him, until he is released."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.slowDown(vehicle_id, speed_mps, max(time_s, self._step_s))
 
-    def accept_no_gap(self, vehicle_id: str) -> None:
-        """Has SUMO think each gap a thousand times too small for a vehicle to change lanes."""
-        libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", "0.001")
+    def hold(self, vehicle_id: str, speed_mps: float) -> None:
+        """Has a driver keep a speed until he is released."""
+        _check_speed(vehicle_id, speed_mps)
+        libsumo.vehicle.setSpeed(vehicle_id, speed_mps)
+
+    def release(self, vehicle_id: str) -> None:
+        """Leaves a vehicle to its driver again; one that has left the road needs nothing."""
+        if vehicle_id in libsumo.vehicle.getIDList():
+            libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
+            libsumo.vehicle.setSpeed(vehicle_id, -1.0)
+
+    def judge_gaps_by(self, vehicle_id: str, tau_s: float, assertive: float) -> None:
+        """Sets by what SUMO judges gaps for a vehicle that would like to change lanes.
+
+        It asks for ``tau_s`` behind the vehicle in front, and divides what it asks for by
+        ``assertive``.
+        """
+        libsumo.vehicle.setTau(vehicle_id, tau_s)
+        libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", repr(assertive))
 
     def drive_evenly(
         self, vehicle_id: str, before_mps: float, after_mps: float, steps: int

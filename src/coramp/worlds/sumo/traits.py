@@ -1,7 +1,7 @@
 """What tells one driver of a population from another: time gap and speed factor."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -11,14 +11,21 @@ from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import generator
 from coramp.road.streams import STREAMS
 from coramp.scenarios.sections import DriverPopulation, SpeedFactor
+from coramp.scenarios.world_sections import Behaviour
 
 
 @dataclass(frozen=True)
 class DriverTraits:
-    """One driver: the time gap that it keeps, and its wish over the common speed, None for 1."""
+    """One driver: the time gap that it keeps, and its wish over the common speed, None for 1.
+
+    One who ``never_yields`` makes no room for others. ``looks_each_s`` is how often an inattentive
+    one looks around, None for each step.
+    """
 
     tau_s: float
     speed_factor: float | None
+    never_yields: bool = False
+    looks_each_s: float | None = None
 
 
 def traits_of(
@@ -51,3 +58,21 @@ def _speed_factors(asked: SpeedFactor | None, draws: FloatArray) -> list[float |
     low, high = normal.cdf(asked.low), normal.cdf(asked.high)
     shares = low + (high - low) * draws
     return [min(asked.high, max(asked.low, normal.inv_cdf(share))) for share in shares.tolist()]
+
+
+def with_careless(
+    traits: Sequence[DriverTraits], behaviour: Behaviour, seed: int
+) -> list[DriverTraits]:
+    """Returns the drivers, some of whom never yield or are inattentive.
+
+    Random numbers do not depend on the shares: who is careless at one share is so at a higher one.
+    """
+    never, late = generator(seed, "faults/manners").random((2, len(traits)))
+    return [
+        replace(
+            own,
+            never_yields=bool(never[k] < behaviour.never_yields_share),
+            looks_each_s=behaviour.inattentive_s if late[k] < behaviour.inattentive_share else None,
+        )
+        for k, own in enumerate(traits)
+    ]

@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,17 +19,20 @@ from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.worlds.outcomes import cap_step_of, step_after
 from coramp.worlds.sumo.as_driven import outcome_as_driven
-from coramp.worlds.sumo.demand import Automated, driver_routes
+from coramp.worlds.sumo.careless import Careless, CarelessDrivers
+from coramp.worlds.sumo.demand import KRAUSS, Automated, driver_routes
 from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
 from coramp.worlds.sumo.metering import Meter, loops
 from coramp.worlds.sumo.network import driver_road_plan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.telling import DriversInSumo, with_answers
-from coramp.worlds.sumo.traits import traits_of
+from coramp.worlds.sumo.traits import traits_of, with_careless
 from coramp.worlds.telling import reports_of_samples
 
 LEAST_TAU_S = 0.1
 """The least time gap that SUMO's Krauss model keeps free of collisions: one step."""
+AUTOMATION_MODELS = {"acc": 'carFollowModel="ACC"', "cacc": 'carFollowModel="CACC"'}
+"""By ``traffic.automation``, where it is not Krauss."""
 LOOK_S = 60.0
 """How long SUMO runs by itself between two looks at whether it is empty."""
 
@@ -53,7 +57,7 @@ def run_uncontrolled(
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
-        traits = traits_of(drivers, arrivals, seed)
+        traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered, automated))
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
@@ -64,7 +68,8 @@ def run_uncontrolled(
             service = Service(
                 strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
             )
-            _let_drive(session, service, road, meter, look_steps, cap_step)
+            careless = CarelessDrivers(Careless(scenario, session, seed), plan, arrivals)
+            _let_drive(session, service, road, meter, careless, Looks(look_steps, cap_step))
         files.keep()
         samples, finished = files.samples(arrivals), files.finished()
         collisions, collided = files.collisions(), files.collided(arrivals)
@@ -85,6 +90,7 @@ def run_uncontrolled(
         told=told,
         drivers=population,
         collided=collided,
+        world_events=tuple(careless.events),
     )
 
 
@@ -93,20 +99,30 @@ def alone_among_drivers(
 ) -> Automated | None:
     """Returns the automated vehicles that nobody coordinates, None where there are none.
 
-    SUMO's Krauss model drives them without imperfection, at the gaps of ``[safety]``.
+    SUMO drives them as ``traffic.automation`` says, at the gaps of ``[safety]``. Where no share is
+    given, all have drivers.
     """
-    if not scenario.is_mixed:
+    if not scenario.gives_shares:
         return None
     vehicles = automated_of(scenario, arrivals, seed)
     if not vehicles.any():
         return None
-    yields = 1.0 if scenario.traffic.automation == "yielding" else 0.0
+    automation = scenario.traffic.automation
+    yields = 0.0 if automation == "not-yielding" else 1.0
     return Automated(
         vehicles,
         max(scenario.safety.time_gap_s, LEAST_TAU_S),
         scenario.safety.standstill_gap_m,
         f'lcCooperative="{yields!r}"',
+        AUTOMATION_MODELS.get(automation, KRAUSS),
     )
+
+
+class Looks(NamedTuple):
+    """How many steps lie between two looks at SUMO, and at which step a run is cut off."""
+
+    steps: int
+    cap_step: int
 
 
 def _let_drive(
@@ -114,15 +130,15 @@ def _let_drive(
     service: Service,
     road: DriversInSumo,
     meter: Meter | None,
-    look_steps: int,
-    cap_step: int,
+    careless: CarelessDrivers,
+    looks: Looks,
 ) -> None:
     """Lets SUMO run until it is empty; tells the service so far each ``look_steps``, and obeys."""
     step = 0
-    while step < cap_step and (step == 0 or session.vehicles_left()):
-        until = min(cap_step, step + look_steps)
+    while step < looks.cap_step and (step == 0 or session.vehicles_left()):
+        until = min(looks.cap_step, step + looks.steps)
         readings = [] if meter is None else [meter.read(step, until)]
-        session.step_to(until)
+        careless.step_to(step, until)
         road.now_step = step = until
         commands = service.handle(readings, step)
         if meter is not None:

@@ -1,0 +1,186 @@
+"""What the coordinator hears of vehicles, and what vehicles hear of it.
+
+In a perfect world both is all that there is, at once. Otherwise reports and commands go over links,
+positions and clocks are wrong, and what was heard last is carried on from its time.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.demand.arrivals import generator
+from coramp.mixed.situation import Steering
+from coramp.mixed.users import RoadUsers
+from coramp.scenarios.model import Scenario
+from coramp.worlds.faults.link import LossyLink
+from coramp.worlds.faults.positions import WrongClocks, WrongPositions
+
+NUMBER, STAMP, STATION, SPEED, ON_MAINLINE = range(5)
+"""Columns of a report."""
+GIVEN, MOST, MERGE = 1, 2, 3
+"""Columns of a command, after the number of its vehicle."""
+BEYOND_M = 20.0
+
+
+@dataclass
+class Air:
+    """Both links of a run. ``reporting`` is which arrivals tell where they are."""
+
+    scenario: Scenario
+    reporting: BoolArray
+    automated: BoolArray
+    seed: int
+    fallbacks: int = 0
+    _reports: LossyLink = field(init=False)
+    _commands: LossyLink = field(init=False)
+    _positions: WrongPositions = field(init=False)
+    _clocks: WrongClocks = field(init=False)
+    _known: FloatArray = field(init=False)
+    _command: FloatArray = field(init=False)
+    _reported_s: FloatArray = field(init=False)
+    _silent_from_s: FloatArray = field(init=False)
+    _lie_m: FloatArray = field(init=False)
+    _disobeys: BoolArray = field(init=False)
+    _overdue: BoolArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Each fault draws from random numbers of its own."""
+        scenario, count = self.scenario, len(self.reporting)
+        self._reports = LossyLink(scenario.reports, count, self._random("reports"))
+        self._commands = LossyLink(scenario.commands, count, self._random("commands"))
+        self._positions = WrongPositions(scenario.positioning, count, self._random("positioning"))
+        self._clocks = WrongClocks(scenario.clock, count, self._random("clock"))
+        self._known, self._command = np.full((count, 5), np.nan), np.full((count, 4), np.nan)
+        self._reported_s, self._overdue = np.full(count, -np.inf), np.zeros(count, np.bool_)
+        self._draw_characters(count)
+
+    def _random(self, fault: str) -> np.random.Generator:
+        return generator(self.seed, f"faults/{fault}")
+
+    def _draw_characters(self, count: int) -> None:
+        """Who falls silent when, who lies, who disobeys: automated vehicles alone."""
+        behaviour, horizon_s = self.scenario.behaviour, self.scenario.simulation.horizon_s
+        random = self._random("behaviour")
+        silent, lies, disobeys = random.random((3, count))
+        chosen = self.automated & (silent < behaviour.silent_share)
+        self._silent_from_s = np.where(chosen, random.random(count) * horizon_s, np.inf)
+        lies_m = np.where(lies < behaviour.lies_share, behaviour.lie_m, 0.0)
+        self._lie_m = np.where(self.automated, lies_m, 0.0)
+        self._disobeys = self.automated & (disobeys < behaviour.disobeys_share)
+
+    @property
+    def is_perfect(self) -> bool:
+        """Whether everything arrives at once and is right."""
+        scenario = self.scenario
+        tables = (scenario.positioning, scenario.clock, scenario.reports, scenario.commands)
+        return scenario.behaviour.is_perfect and all(table.is_perfect for table in tables)
+
+    def heard(self, now_s: float, users: RoadUsers) -> RoadUsers:
+        """Returns what the coordinator knows of who is on the road now."""
+        if self.is_perfect:
+            known = self.reporting[users.number]
+            return users if known.all() else RoadUsers._make(column[known] for column in users)
+        self._report(now_s, users)
+        for row in self._reports.received(now_s):
+            number = int(row[NUMBER])
+            if not row[STAMP] <= self._known[number, STAMP]:  # newer, or the first
+                self._known[number] = row
+        return self._carried_on(now_s, users)
+
+    def _report(self, now_s: float, users: RoadUsers) -> None:
+        """Sends reports of those whose time has come, with the errors of the moment."""
+        period_s = self.scenario.reports.period_s or 0.0
+        number = users.number
+        due = self.reporting[number] & (now_s < self._silent_from_s[number])
+        due &= now_s - self._reported_s[number] >= period_s - 1e-9
+        own = number[due]
+        self._reported_s[own] = now_s
+        error_m = self._positions.error_m(own, now_s) + self._lie_m[own]
+        rows = np.column_stack(
+            [
+                own.astype(np.float64),
+                now_s + self._clocks.error_s(own, now_s),
+                users.station_m[due] + error_m,
+                np.maximum(0.0, users.speed_mps[due] + self._positions.speed_error_mps(len(own))),
+                users.on_mainline[due].astype(np.float64),
+            ]
+        )
+        self._reports.send(now_s, rows)
+
+    def _carried_on(self, now_s: float, users: RoadUsers) -> RoadUsers:
+        """The last reports, carried on at their speeds; those that are stale are forgotten."""
+        known, end_m = self._known, self.scenario.mainline.end_m
+        age_s = np.clip(now_s - known[:, STAMP], 0.0, None)
+        station_m = known[:, STATION] + known[:, SPEED] * age_s
+        fresh = (age_s <= self.scenario.reports.stale_s) & (station_m < end_m + BEYOND_M)
+        number = np.flatnonzero(fresh)
+        place = self._place_of(users)
+        number = number[place[number] >= 0]  # who has left says so to the road's own detectors
+        there = place[number]
+        return users._replace(
+            number=number,
+            station_m=station_m[number],
+            speed_mps=known[number, SPEED].copy(),
+            length_m=users.length_m[there],
+            on_mainline=known[number, ON_MAINLINE] > 0.5,
+            automated=users.automated[there],
+            cruise_mps=users.cruise_mps[there],
+            acceleration_mps2=users.acceleration_mps2[there],
+            power_wpkg=users.power_wpkg[there],
+            braking_mps2=users.braking_mps2[there],
+        )
+
+    def _place_of(self, users: RoadUsers) -> IntArray:
+        place = np.full(len(self.reporting), -1)
+        place[users.number] = np.arange(len(users.number))
+        return place
+
+    def tell(self, now_s: float, seen: RoadUsers, steering: Steering) -> None:
+        """Sends to each automated vehicle how much it may speed up and whether it may merge."""
+        own = seen.automated
+        rows = np.column_stack(
+            [
+                seen.number[own].astype(np.float64),
+                np.full(int(own.sum()), now_s),
+                steering.most_mps2[own],
+                steering.may_merge[own].astype(np.float64),
+            ]
+        )
+        self._commands.send(now_s, rows)
+
+    def told(self, now_s: float, users: RoadUsers) -> tuple[FloatArray, BoolArray]:
+        """Returns the bound (m/s2) that each vehicle on the road has, and who may merge.
+
+        What is older than what a vehicle has changes nothing. A vehicle whose last command is
+        overdue goes by itself: it keeps its distances, and does not merge.
+        """
+        for row in self._commands.received(now_s):
+            number = int(row[NUMBER])
+            if not row[GIVEN] <= self._command[number, GIVEN]:
+                self._command[number] = row
+        command = self._command[users.number]
+        valid_s = self.scenario.commands.valid_s
+        obeys = command[:, GIVEN] >= now_s - valid_s - 1e-9
+        obeys &= ~self._disobeys[users.number] & users.automated
+        obeys &= now_s < self._silent_from_s[users.number]
+        self._count_fallbacks(users, obeys, command)
+        most_mps2 = np.where(obeys, command[:, MOST], np.inf)
+        return most_mps2, obeys & (command[:, MERGE] > 0.5)
+
+    def _count_fallbacks(self, users: RoadUsers, obeys: BoolArray, command: FloatArray) -> None:
+        """Counts each time that a vehicle which had commands goes by itself."""
+        overdue = users.automated & ~obeys & ~np.isnan(command[:, GIVEN])
+        self.fallbacks += int((overdue & ~self._overdue[users.number]).sum())
+        self._overdue[users.number] = overdue
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many messages there were, how many were lost, how often vehicles went alone."""
+        return {
+            "reports_sent": self._reports.sent,
+            "reports_lost": self._reports.lost,
+            "commands_sent": self._commands.sent,
+            "commands_lost": self._commands.lost,
+            "fallbacks": self.fallbacks,
+        }

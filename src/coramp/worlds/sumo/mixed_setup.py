@@ -1,0 +1,110 @@
+"""What automated vehicles among drivers keep, are, and look like to SUMO's drivers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray
+from coramp.coordination.plant import Arrival
+from coramp.equations.conflict_risk import GRAVITY_MPS2
+from coramp.mixed.laws import SafetyLaw
+from coramp.mixed.users import Gaps
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import DriverPopulation
+from coramp.vehicles.traits import Traits
+from coramp.worlds.faults.actuators import SlowActuators
+from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
+
+LANE_END_M = 3.0
+"""An automated vehicle that has not merged stands so far before the acceleration lane ends."""
+MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.3
+"""How much more than behind an automated vehicle one keeps behind a driver."""
+MORE_FOR_DRIVER_S = 0.3
+"""How much more than a driver's own gap room for one who merges has."""
+TRUCK_BRAKING_MPS2 = 5.0
+"""What the brakes of a heavy vehicle must do (UN Regulation 13, type 0 test)."""
+YIELDED_TO = 'lcCooperative="1"'
+"""SUMO's drivers yield to it as to one another."""
+
+
+def gaps_of(scenario: Scenario, drivers: DriverPopulation) -> Gaps:
+    """Returns which gaps vehicles keep: automated ones those of ``[safety]``."""
+    own_m, own_s = scenario.safety.standstill_gap_m, scenario.safety.time_gap_s
+    theirs_m, theirs_s = drivers.min_gap_m, max(drivers.taus_s)
+    return Gaps(
+        behind_automated_m=own_m,
+        behind_automated_s=own_s,
+        behind_driver_m=own_m + MORE_BEHIND_DRIVER_M,
+        behind_driver_s=own_s + MORE_BEHIND_DRIVER_S,
+        of_driver_m=theirs_m,
+        of_driver_s=theirs_s,
+        for_driver_m=theirs_m,
+        for_driver_s=theirs_s + MORE_FOR_DRIVER_S,
+    )
+
+
+def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
+    """Returns what automated vehicles keep on board on this road, commanded once a period.
+
+    They react no sooner than at their next command. Drivers move in Euler steps, in which one
+    that brakes from v comes to a stand v h / 2 earlier than by v^2 / (2 b).
+    """
+    law = SafetyLaw()
+    shorter_m = 0.5 * scenario.mainline.limit_mps * scenario.control.step_s
+    end_m = scenario.ramp.acceleration_lane_m - LANE_END_M
+    return law._replace(
+        reaction_s=max(law.reaction_s, period_s),
+        margin_m=max(law.margin_m, shorter_m),
+        lane_end_m=end_m,
+    )
+
+
+def automated_types(scenario: Scenario, automated: BoolArray, law: SafetyLaw) -> Automated:
+    """Returns how SUMO's drivers know automated vehicles: by the gaps that these keep at least."""
+    return Automated(
+        automated,
+        max(scenario.safety.time_gap_s, law.reaction_s),
+        max(scenario.safety.standstill_gap_m, law.margin_m),
+        YIELDED_TO,
+    )
+
+
+@dataclass(frozen=True)
+class Able:
+    """What vehicles are and can do, one entry an arrival."""
+
+    number: Mapping[str, int]
+    automated: BoolArray
+    length_m: FloatArray
+    cruise_mps: FloatArray
+    acceleration_mps2: FloatArray
+    power_wpkg: FloatArray
+    braking_mps2: FloatArray
+
+    @classmethod
+    def of(cls, scenario: Scenario, arrivals: Sequence[Arrival], automated: BoolArray) -> "Able":
+        """Returns what the vehicles of these arrivals can do; the law's braking is the most."""
+        usual = scenario.usual_traits(0.0)
+        traits: list[Traits] = [a.traits or usual for a in arrivals]
+        most_mps2 = SafetyLaw().braking_mps2
+        brakes = [
+            most_mps2 if np.isinf(t.braking_mps2) else max(t.braking_mps2, TRUCK_BRAKING_MPS2)
+            for t in traits
+        ]
+        return cls(
+            {a.vehicle_id: k for k, a in enumerate(arrivals)},
+            automated,
+            np.array([a.length_m for a in arrivals], np.float64),
+            np.array([automated_cruise_mps(scenario, a) for a in arrivals], np.float64),
+            np.array([t.acceleration_mps2 for t in traits], np.float64),
+            np.array([t.power_wpkg for t in traits], np.float64),
+            np.minimum(most_mps2, np.array(brakes, np.float64)),
+        )
+
+
+def actuators_of(scenario: Scenario, vehicles: int) -> SlowActuators:
+    """Returns how automated vehicles follow accelerations on this road."""
+    adhesion = scenario.road.adhesion
+    most_mps2 = np.inf if adhesion is None else adhesion * GRAVITY_MPS2
+    return SlowActuators(scenario.actuators, vehicles, scenario.control.step_s, most_mps2)
