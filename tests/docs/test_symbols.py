@@ -29,6 +29,7 @@ UNITS = {
     "deg": "deg",
     "wpkg": "W/kg",
     "kg": "kg",
+    "km": "km",
     "m": "m",
     "s": "s",
     "l": "l",

@@ -26,7 +26,7 @@ def told_of(*words, strategy="mixed-slots"):
         ("ramp_automated_share=2", "2 is too large; allowed is at most 1"),
         ("mainline_automated_share=2", "2 is too large; allowed is at most 1"),
         ("connected_share=2", "2 is too large; allowed is at most 1"),
-        ("automation=maybe", "'maybe' is not known; allowed is 'yielding' or 'not-yielding'"),
+        ("automation=maybe", "'maybe' is not known; allowed is 'yielding',"),
         ("automated_shar=0.5", "unknown key; did you mean automated_share?"),
         ("drivers=fast", "there is no 'fast'; allowed are paper, fair,"),
     ],
@@ -58,15 +58,15 @@ def test_a_share_of_a_type_is_bounded_too():
             (),
             "slots",
             (
-                "strategy: slots cannot plan among drivers, and [traffic] leaves some vehicles to "
-                "them; allowed are mixed-slots, alinea, uncontrolled, or automated shares of 1"
+                "strategy: slots cannot run where [traffic] leaves some vehicles to drivers; "
+                "allowed are mixed-slots, alinea, uncontrolled, or automated shares of 1"
             ),
         ),
         (
             ("--engine", "exact"),
             "mixed-slots",
             (
-                "engine: exact has no drivers, and [traffic] leaves some vehicles to them; choose "
+                "engine: exact cannot run where [traffic] leaves some vehicles to drivers; choose "
                 "sumo, or automated shares of 1"
             ),
         ),
