@@ -94,6 +94,7 @@ def may_change_lane(
     own: int,
     around: Neighbours,
     ahead: Ahead,
+    slowest_mps: float,
     gaps: Gaps,
     following: FollowingLaw,
     law: SafetyLaw,
@@ -102,11 +103,12 @@ def may_change_lane(
 
     Its own to the vehicle in front; that of an automated vehicle behind, which may have to brake at
     2 m/s2; and, of a driver behind, what he would keep and braking in comfort takes:
-    s_0 + T v_Y + (v_Y^2 - v^2) / (2 b).
+    s_0 + T v_Y + (v_Y^2 - v^2) / (2 b), with v = ``slowest_mps``, to which it may slow down before
+    it is there.
     """
     if users.on_mainline[own] or users.station_m[own] < READY_M:
         return False
-    speed_mps, front, rear = users.speed_mps[own], around.front[own], around.rear[own]
+    front, rear = around.front[own], around.rear[own]
     share = max(0.0, users.station_m[own] / law.lane_end_m)
     gentle_mps2 = law.gentle_mps2 + law.gentle_at_end_mps2 * share * share
     if front >= 0:
@@ -121,8 +123,7 @@ def may_change_lane(
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        slower_mps = min(speed_mps, ahead.speed_mps[own])
-        braking_m = (rear_mps**2 - slower_mps**2) / (2.0 * law.driver_mps2)
+        braking_m = (rear_mps**2 - slowest_mps**2) / (2.0 * law.driver_mps2)
         needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
         return bool(free_m >= max(TOUCHING_M, needs_m))
     spare_mps = _keeps_mps(users, rear, own, ahead, law) - ahead.speed_mps[rear]

@@ -9,7 +9,7 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.laws import FollowingLaw, SafetyLaw
-from coramp.mixed.on_board import driven_mps2, may_change_lane, neighbours_of
+from coramp.mixed.on_board import Ahead, Neighbours, driven_mps2, may_change_lane, neighbours_of
 from coramp.mixed.situation import MixedStrategy, Places, Situation
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers
 from coramp.records.outcome import Outcome
@@ -63,7 +63,7 @@ def run_mixed(
                 Able.of(scenario, arrivals, automated),
                 period_steps,
                 step_s,
-                types.tau_s,
+                types.min_gap_m,
                 actuators_of(scenario, len(arrivals)),
             )
             heard = automated | connected_of(scenario, arrivals, seed)
@@ -119,12 +119,30 @@ class Control:
         """Returns the acceleration (m/s2) of each vehicle and who changes lanes."""
         most_mps2, may_merge = self._told(now_s, plant.period_s, users)
         around, ahead = neighbours_of(users), plant.ahead(users)
+        wishes = may_merge & on_lane & users.automated
+        accel_mps2 = self._driven(users, around, ahead, most_mps2, wishes, plant.period_s)
+        if not wishes.any():
+            return accel_mps2, wishes
+        slower_mps = users.speed_mps + np.minimum(0.0, accel_mps2) * plant.period_s
+        slowest_mps = np.minimum(slower_mps, ahead.speed_mps)
         changes = np.zeros(len(users.number), np.bool_)
-        for own in np.flatnonzero(may_merge & on_lane & users.automated).tolist():
+        for own in np.flatnonzero(wishes).tolist():
             changes[own] = may_change_lane(
-                users, own, around, ahead, self.gaps, self.following, self.law
+                users, own, around, ahead, slowest_mps[own], self.gaps, self.following, self.law
             )
-        accel_mps2 = driven_mps2(
+        return self._driven(users, around, ahead, most_mps2, changes, plant.period_s), changes
+
+    def _driven(
+        self,
+        users: RoadUsers,
+        around: Neighbours,
+        ahead: Ahead,
+        most_mps2: FloatArray,
+        changes: BoolArray,
+        period_s: float,
+    ) -> FloatArray:
+        """The acceleration of each vehicle for a period, if these change lanes."""
+        return driven_mps2(
             users,
             around,
             ahead,
@@ -134,9 +152,8 @@ class Control:
             self.following,
             self.law,
             self.road,
-            plant.period_s,
+            period_s,
         )
-        return accel_mps2, changes
 
     def _told(
         self, now_s: float, period_s: float, users: RoadUsers

@@ -14,7 +14,7 @@ from coramp.worlds.sumo.network import RAMP_LANES
 from coramp.worlds.sumo.session import Session
 
 MERGE_LANE = "merge_0"
-NO_GAP_S, NOT_ASSERTIVE = 30.0, 0.001
+NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
 
 
@@ -23,8 +23,8 @@ class MixedPlant:
     """The vehicles in a SUMO session: where they are, and what automated ones do.
 
     An automated vehicle's speed is that of its commands: under Euler steps SUMO's own is off by
-    half a step's acceleration. ``tau_s`` is the time gap by which drivers know it, once it is on
-    the mainline. ``largest_error_m`` is how far each was from where it was sent, nan for drivers.
+    half a step's acceleration. ``min_gap_m`` is what SUMO has it keep once it is on the
+    mainline. ``largest_error_m`` is how far each was from where it was sent, nan for drivers.
     """
 
     session: Session
@@ -32,7 +32,7 @@ class MixedPlant:
     able: Able
     period_steps: int
     step_s: float
-    tau_s: float
+    min_gap_m: float
     actuators: SlowActuators
     largest_error_m: FloatArray = field(init=False)
     _sent_mps: FloatArray = field(init=False)
@@ -99,13 +99,13 @@ class MixedPlant:
         for i in own[new].tolist():
             self.session.take_over_among_drivers(names[i])
             if not users.on_mainline[i]:
-                self.session.judge_gaps_by(names[i], NO_GAP_S, NOT_ASSERTIVE)
+                self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
         for i in own[users.on_mainline[own]].tolist():
             if int(users.number[i]) in self._changing:
                 self.session.take_over_among_drivers(names[i])
                 self._changing.discard(int(users.number[i]))
         for i in np.flatnonzero(changes).tolist():
-            self.session.judge_gaps_by(names[i], self.tau_s, 1.0)
+            self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self.session.change_lane_now(names[i], 1, self.period_steps)
             self._changing.add(int(users.number[i]))
         chosen = [names[i] for i in own.tolist()]

@@ -138,13 +138,13 @@ class Session:
             libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
             libsumo.vehicle.setSpeed(vehicle_id, -1.0)
 
-    def judge_gaps_by(self, vehicle_id: str, tau_s: float, assertive: float) -> None:
+    def judge_gaps_by(self, vehicle_id: str, min_gap_m: float, assertive: float) -> None:
         """Sets by what SUMO judges gaps for a vehicle that would like to change lanes.
 
-        It asks for ``tau_s`` behind the vehicle in front, and divides what it asks for by
-        ``assertive``.
+        It asks for ``min_gap_m`` behind the vehicle in front, and divides what it asks for behind
+        by ``assertive``.
         """
-        libsumo.vehicle.setTau(vehicle_id, tau_s)
+        libsumo.vehicle.setMinGap(vehicle_id, min_gap_m)
         libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", repr(assertive))
 
     def drive_evenly(
