@@ -19,6 +19,7 @@ from coramp.runs.beforehand import (
     seeds_without_effect,
     without_effect_on_drivers,
 )
+from coramp.runs.mixed import check_messages_kept
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
 from coramp.scenarios.snapshots import load_snapshot
@@ -102,6 +103,8 @@ def run(
         raise CorampError(f"{option}: the {engine} engine runs without SUMO; use --engine sumo")
     if out is None and keep_sumo:
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
+    if keep_messages:
+        check_messages_kept(spec.is_mixed)
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if notice is not None and (line := without_effect_on_drivers([spec])) is not None:

@@ -324,3 +324,15 @@ def test_he_excuses_nobody_else_behind_him():
     )
     assert [(deed.rear, deed.front) for deed in findings.broken] == [(1, 0)]
     assert causes(findings) == [(2, 0, BY_AUTOMATED)]
+
+
+def test_who_comes_upon_a_collision_breaks_no_promise_but_may_cause_the_next():
+    """One drives through a slow driver within 1 s; whoever followed it is 10 m behind him then."""
+    steps = [0.0] * 30
+    findings = found(
+        Way(FRONT_M, 3.0, DRIVER, steps),
+        behind(7.0, 15.0, DRIVER, accel_mps2=steps),
+        behind(7.0 + 15.0, 15.0, AUTOMATED, accel_mps2=steps),
+    )
+    assert causes(findings) == [(1, 0, AMONG_DRIVERS), (2, 0, BY_AUTOMATED)]
+    assert findings.unkept == ()

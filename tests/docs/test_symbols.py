@@ -29,6 +29,7 @@ UNITS = {
     "deg": "deg",
     "wpkg": "W/kg",
     "kg": "kg",
+    "km": "km",
     "m": "m",
     "s": "s",
     "l": "l",
@@ -43,6 +44,7 @@ FILES = {
     "attempts.parquet": schemas.ATTEMPTS,
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
+    "safety_events.parquet": schemas.SAFETY_EVENTS,
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
 }

@@ -44,6 +44,7 @@ def test_what_the_design_promises_is_built_in():
         "virtual-platoon",
         "ocbf",
         "slots",
+        "mixed-slots",
         "alinea",
         "uncontrolled",
     ]

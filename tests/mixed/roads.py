@@ -3,6 +3,7 @@
 import numpy as np
 
 from coramp.mixed.laws import FollowingLaw, SafetyLaw, SequenceLaw
+from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers
 
 ROAD = MixedRoad(mainline_speed_mps=20.0, ramp_speed_mps=16.0, ramp_limit_mps=16.67)
@@ -72,3 +73,8 @@ def users_of(rows):
         np.full(count, np.inf),
         np.array([row[5] for row in full], np.float64),
     )
+
+
+def at_once(users):
+    """Returns where vehicles are when a command acts that acts at once."""
+    return Ahead(np.zeros(len(users.number)), users.speed_mps, 0.0)

@@ -14,9 +14,9 @@ from coramp.mixed.on_board import (
     may_change_lane,
     neighbours_of,
 )
-from coramp.worlds.sumo.mixed import LANE_END_M
+from coramp.worlds.sumo.mixed_setup import LANE_END_M
 from tests.mathematics import close
-from tests.mixed.roads import FOLLOWING, GAPS, ROAD, SAFETY, users_of
+from tests.mixed.roads import FOLLOWING, GAPS, ROAD, SAFETY, at_once, users_of
 
 OURS = SafetyLaw()
 PIECE_S = 0.05
@@ -58,7 +58,9 @@ def accel_of(own, leaders, braking_mps2, told_mps2, period_s, *, changes):
     told = np.full(len(rows), told_mps2)
     law = OURS._replace(lane_end_m=1e6, reaction_s=max(OURS.reaction_s, period_s))
     around = neighbours_of(users)
-    return driven_mps2(users, around, told, changing, GAPS, FollowingLaw(), law, ROAD, period_s)[0]
+    return driven_mps2(
+        users, around, at_once(users), told, changing, GAPS, FollowingLaw(), law, ROAD, period_s
+    )[0]
 
 
 def smallest_gap_m(own_mps, braking_mps2, leaders, motions, told_mps2, period_s):
@@ -148,7 +150,16 @@ def test_who_does_not_merge_stands_before_the_lane_ends(station_m, speed_mps, pe
         users = users_of([(station_m, speed_mps, False, True)])
         told, changes = np.array([max(told_mps2, 0.0)]), np.zeros(1, np.bool_)
         accel = driven_mps2(
-            users, neighbours_of(users), told, changes, GAPS, FOLLOWING, SAFETY, ROAD, period_s
+            users,
+            neighbours_of(users),
+            at_once(users),
+            told,
+            changes,
+            GAPS,
+            FOLLOWING,
+            SAFETY,
+            ROAD,
+            period_s,
         )[0]
         new_mps = speed_mps + accel * period_s
         assert new_mps >= -1e-9
@@ -183,7 +194,9 @@ def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
 
     def may(rear_m):
         users = users_of([(100.0, 14.0, False, True), (rear_m, 20.0, True, False)])
-        return may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+        return may_change_lane(
+            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+        )
 
     assert may(100.0 - 5.0 - 43.68)
     assert not may(100.0 - 5.0 - 43.65)
@@ -192,7 +205,9 @@ def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
 def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_behind():
     def may(*others):
         users = users_of([(100.0, 18.0, False, True), *others])
-        return may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+        return may_change_lane(
+            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+        )
 
     assert may()
     assert may((140.0, 18.0, True, False), (60.0, 18.0, True, True))
@@ -205,14 +220,25 @@ def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_beh
 def test_nobody_changes_lanes_before_the_nose_or_from_the_mainline():
     for row in [(0.5, 16.0, False, True), (-20.0, 16.0, False, True), (50.0, 16.0, True, True)]:
         users = users_of([row])
-        assert not may_change_lane(users, 0, neighbours_of(users), GAPS, FOLLOWING, SAFETY)
+        assert not may_change_lane(
+            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+        )
 
 
 def test_drivers_are_given_nothing_to_do():
     users = users_of([(100.0, 20.0, True, False), (94.0, 20.0, True, False)])
     told, changes = np.full(2, -3.0), np.zeros(2, np.bool_)
     accel = driven_mps2(
-        users, neighbours_of(users), told, changes, GAPS, FOLLOWING, SAFETY, ROAD, 0.2
+        users,
+        neighbours_of(users),
+        at_once(users),
+        told,
+        changes,
+        GAPS,
+        FOLLOWING,
+        SAFETY,
+        ROAD,
+        0.2,
     )
     assert accel.tolist() == [0.0, 0.0]
 

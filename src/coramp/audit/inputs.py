@@ -9,6 +9,7 @@ import numpy as np
 from coramp._kernel import IntArray
 from coramp.audit.orders import Askers, Orders
 from coramp.checker.merging import NOT_COMMANDED, ON_IT_AT_ENTRY
+from coramp.errors import CorampError
 from coramp.messages.commands import Enter, SetSignal, WorldCommand
 from coramp.messages.kinds import COMMAND, ENTRY, TRAIT_COLUMNS
 from coramp.messages.log_reader import MessageLog, read_log
@@ -56,6 +57,11 @@ def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     scenario = run.scenario
     known = set(run.vehicles["vehicle_id"].to_list())
     path = folder / f"{MESSAGES}.parquet"
+    if run.safety_events is not None and not path.exists():
+        raise CorampError(
+            f"{folder}: automated vehicles drove among drivers here, and no messages were kept; "
+            "audit a run of automated vehicles alone, or of drivers alone"
+        )
     log = read_log(path, scenario.control.step_s, known, put_in_order)
     askers = _askers(log, scenario)
     rows = log.of_kind(ENTRY, COMMAND)[: 0 if len(log.strangers) else None]

@@ -114,7 +114,9 @@ def findings_of(
     broken = [b for b in broken if not _over(touched, b.time_s, b.rear, b.front)]
     unkept = _first_of_each(time_s, rear, front, short)
     unkept += _first_of_each(time_s, rear, front, _pushed_in(seen, pairs, came_in, limits))
-    unkept = [pair for pair in unkept if not (_over(touched, *pair) or _explained(pair, broken))]
+    unkept = [
+        pair for pair in unkept if not (_behind_a_wreck(touched, pair) or _explained(pair, broken))
+    ]
     collisions = tuple(
         Collision(*pair, _cause(pair, seen.automated, broken, unkept))
         for pair in sorted(touched.values())
@@ -192,6 +194,14 @@ def _over(
     """Whether two have collided before: what is between them then tells nothing."""
     pair = frozenset((rear, front))
     return pair in touched and time_s > touched[pair][0]
+
+
+def _behind_a_wreck(
+    touched: dict[frozenset[int], tuple[float, int, int]], pair: tuple[float, int, int]
+) -> bool:
+    """Whether the vehicle in front has collided before: no brakes stop as a collision does."""
+    time_s, _, front = pair
+    return any(front in crashed and time_s > first[0] for crashed, first in touched.items())
 
 
 def _once(broken: Sequence[Broken]) -> list[Broken]:

@@ -95,7 +95,10 @@ def print_run(
     """Prints the summary of a run, with speeds in a unit, and where its records lie."""
     print_table(run_table(result.summary, unit), wide)
     if out is not None:
-        print(f"Records are in {out}; coramp explain {out} VEHICLE explains one vehicle's plan.")
+        told = f"coramp explain {out} VEHICLE explains one vehicle's plan"
+        if result.decisions is None:
+            told = f"coramp report {out} shows them"
+        print(f"Records are in {out}; {told}.")
 
 
 def print_audit(result: Audit, wide: bool = False) -> None:

@@ -69,6 +69,12 @@ class RunRecords:
         return Scenario.model_validate(self.content["specification"], strict=False)
 
     @property
+    def is_mixed(self) -> bool:
+        """Whether automated vehicles drove among drivers."""
+        columns = self.vehicles.columns
+        return "automated" in columns and self.vehicles["automated"].n_unique() == 2
+
+    @property
     def flows(self) -> str:
         """The flows in words."""
         return f"{self.content['mainline_veh_h']:g} + {self.content['ramp_veh_h']:g} veh/h"
@@ -100,6 +106,11 @@ class RunRecords:
 
         Raises CorampError for a run in which nobody was coordinated, or where one is lost.
         """
+        if self.safety_events is not None:
+            raise CorampError(
+                f"vehicles among drivers drive without plans, so that there is none to {what}; "
+                f"{what} a run of automated vehicles alone"
+            )
         if self.trajectories is None and self.decisions is None:
             raise CorampError(f"no vehicle was coordinated in this run; {what} a cooperative one")
         if self.trajectories is None or self.decisions is None:

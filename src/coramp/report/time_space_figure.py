@@ -9,12 +9,14 @@ from coramp.errors import CorampError
 from coramp.records.run import RunRecords
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
-from coramp.report.style import YELLOW, grid, legend_below, new_figure
+from coramp.report.style import GREY, YELLOW, grid, legend_below, new_figure
 from coramp.vehicles.merge_state import came_by_mainline
 
 WINDOW_S = 120.0
 """How long the window is where its end is not given."""
 STEP_S = 0.25
+AUTOMATED_COLOUR = "#7a2bbf"
+"""As in the page's style sheet."""
 
 
 def run_time_space_figure(
@@ -31,6 +33,8 @@ def run_time_space_figure(
     if not (math.isfinite(from_s) and math.isfinite(until_s) and from_s < until_s):
         raise CorampError(f"until_s: {until_s:g} is not after from_s; allowed is above {from_s:g}")
     moved = _moved(run)
+    kinds = zip(run.vehicles["vehicle_id"], run.vehicles["automated"], strict=True)
+    automated = dict(kinds) if run.is_mixed else {}
     figure = new_figure(10.0, 5.6)
     axes = figure.subplots()
     lane_m = run.scenario.ramp.acceleration_lane_m
@@ -38,7 +42,7 @@ def run_time_space_figure(
     for name, driven in driven_of(run.motion, run.vehicles).items():
         times_s, stations_m = driven.line(from_s, until_s, STEP_S)
         if len(times_s):
-            colour, label, width_pt = _look(driven, name in moved)
+            colour, label, width_pt = _look(driven, name in moved, automated.get(name))
             axes.plot(times_s, stations_m, color=colour, linewidth=width_pt, label=label, gid=name)
     merges = _merges(run)
     within = merges.filter(merges["merge_time_s"].is_between(from_s, until_s))
@@ -86,8 +90,16 @@ def _merges(run: RunRecords) -> pl.DataFrame:
     )
 
 
-def _look(driven: Driven, moved: bool) -> tuple[str, str, float]:
-    """A vehicle's colour, name in the legend and width (pt), as in diagrams of plans."""
+def _look(driven: Driven, moved: bool, automated: bool | None) -> tuple[str, str, float]:
+    """A vehicle's colour, name in the legend and width (pt), as in diagrams of plans.
+
+    Where drivers and automated vehicles mix, by whether it is ``automated``.
+    """
+    if automated is not None:
+        width_pt = 0.8 if came_by_mainline(driven.merge_s) else 1.3
+        return (
+            (AUTOMATED_COLOUR, "automated", width_pt) if automated else (GREY, "driver", width_pt)
+        )
     if not came_by_mainline(driven.merge_s):
         return RAMP_COLOUR, "ramp vehicle", 1.2
     if moved:

@@ -20,17 +20,26 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
     """Raises CorampError if a strategy, an engine or drivers cannot be those of mixed traffic."""
     why, instead = _asked_for(scenario)
     if engine != "sumo":
-        raise CorampError(f"engine: {engine} cannot do that {why}; choose sumo, or {instead}")
+        raise CorampError(f"engine: {engine} cannot run where {why}; choose sumo, or {instead}")
     if strategy.cooperative and not coordinates_drivers(strategy):
         able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
         raise CorampError(
-            f"strategy: {strategy.name} cannot do that {why}; allowed are {able}, or {instead}"
+            f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, or {instead}"
         )
     integrator = scenario.drivers[population].integrator
     if scenario.has_automated and integrator != "euler":
         raise CorampError(
             f"drivers.{population}.integrator: {integrator} drivers are others than Euler's, and "
             "automated vehicles among them take Euler steps; allowed is euler"
+        )
+
+
+def check_messages_kept(is_mixed: bool) -> None:
+    """Raises CorampError where messages are to be kept of a run that has none."""
+    if is_mixed:
+        raise CorampError(
+            "--keep-messages: automated vehicles among drivers keep no messages yet; "
+            "leave it out, or choose automated shares of 1"
         )
 
 

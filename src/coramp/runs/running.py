@@ -17,14 +17,14 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
-from coramp.runs.mixed import broken_among_drivers, check_mixed
+from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_drivers
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
-from coramp.strategies.base import is_metered
+from coramp.strategies.base import Strategy, is_metered
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M, run_cooperative
@@ -148,7 +148,7 @@ def make_spec(
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
-    check_vehicles_may_differ(loaded, strategy)
+    _check_types(loaded, chosen)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)
     if is_metered(chosen) and loaded.signal_problem:
@@ -162,6 +162,15 @@ def make_spec(
     elif chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def _check_types(scenario: Scenario, strategy: type[Strategy]) -> None:
+    """Raises CorampError for types of vehicles that a strategy cannot plan for.
+
+    Among drivers nothing is planned ahead: there each vehicle's own limits bind it as it drives.
+    """
+    if not (scenario.is_mixed and coordinates_drivers(strategy)):
+        check_vehicles_may_differ(scenario, strategy.name)
 
 
 def stored_spec(content: Row, scenario: Scenario) -> RunSpec:

@@ -12,12 +12,14 @@ from coramp.scenarios.speeds_kmh import KMH_PER_MPS, data_in_mps
 from coramp.scenarios.toml_files import override_text, read
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
-TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation")
+TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation", "traffic")
+SHARES = ("mainline_automated_share", "ramp_automated_share")
 FOLLOWS, DEFAULT = "follows from", "default"
 SOURCES = {
     "ramp.stop_station_m": "the speeds and the acceleration lane",
     "ramp.detector_station_m": "acceleration_lane_m",
     "ramp.signal_station_m": "start_m",
+    **{f"traffic.{key}": "automated_share, 1 where that is left out" for key in SHARES},
     "motion.slow_deviation": "speed_deviation, the gaps and the mainline's speed",
     **{f"{s}.limit_mps": f"speed_mps ({ratio:g} times)" for s, ratio in LIMIT_RATIO.items()},
     **{
@@ -63,6 +65,8 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
                 value, why = getattr(scenario, key), _why_there(scenario, key)
             elif f"{table}.{key}" == "motion.slow_deviation":
                 value, why = scenario.slow_deviation, _from(f"{table}.{key}")
+            elif table == "traffic" and key in SHARES:
+                value, why = scenario.traffic.share_of(key == SHARES[1]), _from(f"traffic.{key}")
             elif value is None:
                 continue
             elif key == "flow_veh_h":

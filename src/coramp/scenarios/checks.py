@@ -174,8 +174,16 @@ def _strategy_problems(scenario: "Scenario") -> list[str]:
 
 
 def _driver_problems(scenario: "Scenario") -> list[str]:
-    """A speed factor must hold its mean, and needs a common speed to be a factor of."""
+    """Drivers among automated vehicles must be there; a speed factor must hold its mean.
+
+    And it needs a common speed to be a factor of.
+    """
     problems = []
+    traffic = scenario.traffic
+    wanted = scenario.is_mixed or "drivers" in traffic.model_fields_set
+    if wanted and traffic.drivers not in scenario.drivers:
+        known = ", ".join(scenario.drivers) or "none: there is no [drivers.NAME] table"
+        problems.append(f"traffic.drivers: there is no {traffic.drivers!r}; allowed are {known}")
     for name, drivers in scenario.drivers.items():
         key, factor = f"drivers.{name}.speed_factor", drivers.speed_factor
         if factor is None:

@@ -56,6 +56,25 @@ LABELS: dict[str, MetricLabel] = {
     "hard_brakings_4_5": MetricLabel("brakings beyond 4.5 m/s2", digits=0),
     "stops": MetricLabel("vehicles that stopped on their way", digits=0),
     "plan_error_m": MetricLabel("largest difference between plan and SUMO", "m", 4),
+    "automated_vehicles": MetricLabel("automated vehicles", digits=0),
+    "automated_hard_brakings_3": MetricLabel(
+        "brakings of automated vehicles beyond 3 m/s2", digits=0
+    ),
+    "driver_hard_brakings_3": MetricLabel("brakings of drivers beyond 3 m/s2", digits=0),
+    "ramp_stops": MetricLabel("ramp vehicles that stopped", digits=0),
+    "collisions_by_automated": MetricLabel("collisions that automated vehicles caused", digits=0),
+    "collisions_by_driver": MetricLabel(
+        "collisions of automated vehicles that drivers caused", digits=0
+    ),
+    "collisions_among_drivers": MetricLabel("collisions among drivers", digits=0),
+    "broken_assumptions": MetricLabel("assumptions that drivers broke", digits=0),
+    "automated_violations": MetricLabel("pairs nearer than automated vehicles promise", digits=0),
+    "reports_sent": MetricLabel("reports sent", digits=0),
+    "reports_lost": MetricLabel("reports lost", digits=0),
+    "commands_sent": MetricLabel("commands sent", digits=0),
+    "commands_lost": MetricLabel("commands lost", digits=0),
+    "fallbacks": MetricLabel("fallbacks on board", digits=0),
+    "vehicle_km": MetricLabel("distance driven", "km", 1),
     "interventions": MetricLabel("unsafe commands that were replaced", digits=0),
     "adjusted_vehicles": MetricLabel("vehicles adjusted for others", digits=0),
     "planning_ms": MetricLabel("planning", "ms", 3),

@@ -5,7 +5,7 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
-from coramp.records.schemas import Row
+from coramp.records.schemas import MIXED_METRICS, Row
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
@@ -22,7 +22,7 @@ SHOWN = (
     *("lane_limit_veh_h", "fuel_l", "vehicles_mainline", "vehicles_ramp", "unserved"),
     *("collisions", "safety_violations", "min_margin_m", "min_margin_equation"),
     *("min_merge_margin_m", "min_ttc_s", "max_decel_mps2", "hard_brakings_3"),
-    *("hard_brakings_4_5", "stops", "plan_error_m", *RUNG_COLUMNS.values()),
+    *("hard_brakings_4_5", "stops", *MIXED_METRICS, "plan_error_m", *RUNG_COLUMNS.values()),
 )
 """The figures of a run that its page has, in order."""
 MEANS = "Delays and speeds are means over vehicles, but for percentiles."
@@ -59,6 +59,7 @@ def run_page(
         versions=Table("Versions", ("what", "version"), tuple(map(_texts, versions.items()))),
         repeat="\n".join(repeat),
         files={},
+        mixed=any(run.is_mixed for run in runs),
     )
 
 
@@ -123,9 +124,19 @@ def asked_table(run: RunRecords, unit: SpeedUnit = MPS) -> Table:
         ("flow, mainline + ramp", run.flows),
         ("arrivals", _arrivals(run)),
         ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
+        *_kinds(run),
         ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
     )
     return Table("Road, traffic and errors of this run", ("what", "value"), rows)
+
+
+def _kinds(run: RunRecords) -> tuple[tuple[str, str], ...]:
+    """Who drives, where drivers and automated vehicles mix."""
+    if not run.is_mixed:
+        return ()
+    automated = run.vehicles["automated"].sum()
+    others = run.vehicles.height - automated
+    return (("vehicles", f"{automated} automated, {others} with {run.summary['drivers']} drivers"),)
 
 
 def _arrivals(run: RunRecords) -> str:
@@ -189,7 +200,13 @@ def notes(run: RunRecords) -> list[str]:
     broken = broken_promises(row)
     if broken:
         found.append(f"Unsafe, {title_of(run)}: {'; '.join(broken)}.")
-    elif row["safety_violations"]:
+    if run.is_mixed and row["safety_violations"]:
+        found.append(
+            f"{title_of(run)}: {row['safety_violations']} pairs came nearer than the safe distance "
+            "of Eq. 1, 15 and 16; they are ringed below. Neither drivers nor automated vehicles "
+            "among them keep it: these keep the distance to stop behind a leader that brakes."
+        )
+    elif row["safety_violations"] and not broken:
         found.append(
             f"{title_of(run)}: {row['safety_violations']} pairs came nearer than the safe distance "
             "of Eq. 1, 15 and 16, which their drivers do not know of; they are ringed below."

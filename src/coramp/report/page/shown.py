@@ -51,6 +51,7 @@ def page_data(run: RunRecords) -> Row:
         "on_ramp": [int(stream == "ramp") for stream in run.vehicles["stream"].to_list()],
         "length": _lengths_m(run),
         "type": _types(run),
+        "automated": _automated(run),
         "position_error": run.vehicles["positioning_error_m"].to_list(),
         "clock_error": run.vehicles["clock_error_s"].to_list(),
         "time_gap": run.vehicles["time_gap_s"].to_list(),
@@ -128,6 +129,13 @@ def _types(run: RunRecords) -> list[str]:
     if "vehicle_type" in run.vehicles.columns:
         return run.vehicles["vehicle_type"].to_list()
     return [CAR] * run.vehicles.height
+
+
+def _automated(run: RunRecords) -> list[int] | None:
+    """Which vehicles are automated, None where all or none are."""
+    if not run.is_mixed:
+        return None
+    return [int(automated) for automated in run.vehicles["automated"].to_list()]
 
 
 def _decision(

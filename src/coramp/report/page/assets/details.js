@@ -57,7 +57,7 @@ coramp.detailsOf = (run, i) => {
   const { element } = coramp;
   const box = element('div', { class: 'details' });
   const stream = run.on_ramp[i] ? 'ramp' : 'mainline';
-  box.append(element('h4', {}, `${run.ids[i]}, ${stream}, ${run.title}`));
+  box.append(element('h4', {}, [run.ids[i], stream, ...(run.automated ? [coramp.role(run, i)] : []), run.title].join(', ')));
   const list = element('ul', { class: 'story' });
   coramp.story(run, i).forEach((line) => list.append(element('li', {}, line)));
   box.append(list);

@@ -254,8 +254,11 @@ coramp.Diagram = class {
       (i) => coramp.entry(this.run, i) <= max && coramp.exit(this.run, i) >= min);
     this.clipped(u, (ctx) => {
       ctx.lineJoin = 'round';
-      for (const role of ['mainline', 'moved', 'ramp']) {
-        this.stroke(u, seen.filter((i) => coramp.role(this.run, i) === role), role, role === 'ramp' ? 1.6 : 1);
+      for (const role of ['driver', 'automated', 'mainline', 'moved', 'ramp']) {
+        for (const byRamp of [0, 1]) {
+          const own = (i) => coramp.role(this.run, i) === role && this.run.on_ramp[i] === byRamp;
+          this.stroke(u, seen.filter(own), role, byRamp ? 1.6 : 1);
+        }
       }
       const marked = [...new Set([this.selected, this.hovered])].filter((i) => i !== null);
       marked.forEach((i) => this.stroke(u, [i], coramp.role(this.run, i), 4));

@@ -56,7 +56,7 @@ coramp.windscreen = (ctx, run, i, m, high) => {
 };
 
 // The legend of the replay; ``run`` says how fast one drives there.
-coramp.replayLegend = (run, cooperative) => {
+coramp.replayLegend = (run, cooperative, mixed) => {
   const { element } = coramp;
   const v0 = run.road.v0_mps;
   const ramp = coramp.SPEED_COLOURS.map(([place]) => `${coramp.speedColour(place)} ${100 * place}%`);
@@ -69,6 +69,7 @@ coramp.replayLegend = (run, cooperative) => {
   const slow = coramp.SLOW_SHARE * v0;
   return element('ul', { class: 'legend' }, speeds,
     item('from-ramp', 'white dot: came by the ramp'),
+    mixed ? item('automated', 'violet stripe: automated; the others have drivers') : null,
     item('slow', `red road: slow traffic (mainline below ${coramp.kmh(slow)})`),
     item('stopped', 'ring: stands'),
     cooperative ? item('place', 'dashed: the place on the mainline that a ramp vehicle will take, and keep free') : null,

@@ -118,6 +118,7 @@ coramp.line = (run, i) => {
 
 // What each role is drawn in; the style sheet has the colours, for light and for dark.
 coramp.role = (run, i) => {
+  if (run.automated) return run.automated[i] ? 'automated' : 'driver';
   if (run.on_ramp[i]) return 'ramp';
   return run.movedFor.has(i) ? 'moved' : 'mainline';
 };

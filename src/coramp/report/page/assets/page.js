@@ -9,7 +9,7 @@ coramp.Show = class {
     this.details = element('div', { class: 'detail-box', 'aria-live': 'polite' },
       element('p', { class: 'hint' }, 'Point at a vehicle, or choose one, to see its decision.'));
     const heading = document.querySelector('h2') ? 'h3' : 'h2';
-    box.append(replayBox, this.details, element(heading, {}, 'Time-space diagram'), coramp.legend());
+    box.append(replayBox, this.details, element(heading, {}, 'Time-space diagram'), coramp.legend(runs));
     this.diagrams = runs.map((run) => {
       const diagramBox = element('figure', {}, element('figcaption', {}, run.title));
       box.append(diagramBox);
@@ -51,9 +51,13 @@ coramp.Show = class {
   }
 };
 
-coramp.legend = () => {
+// What lines are drawn in; kinds of vehicles where drivers and automated vehicles mix.
+coramp.legend = (runs) => {
   const { element } = coramp;
-  const entries = { ramp: 'ramp vehicle, dot: its merge', moved: 'moves for another', mainline: 'mainline vehicle',
+  const kinds = { automated: 'automated vehicle', driver: 'driver',
+    ramp: `${runs.every((run) => run.automated) ? 'dot' : 'ramp vehicle, dot'}: merge of a ramp vehicle` };
+  const roles = { ramp: 'ramp vehicle, dot: its merge', moved: 'moves for another', mainline: 'mainline vehicle' };
+  const entries = { ...(runs.every((run) => run.automated) ? {} : roles), ...(runs.some((run) => run.automated) ? kinds : {}),
     lane: 'stations of the acceleration lane', bad: 'nearer than the safe distance', upright: 'time of the replay' };
   return element('ul', { class: 'legend' }, ...Object.entries(entries).map(([key, text]) =>
     element('li', {}, element('span', { class: `swatch ${key}`, 'aria-hidden': 'true' }), text)));

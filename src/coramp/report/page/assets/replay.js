@@ -54,7 +54,8 @@ coramp.Replay = class {
     this.place.append(...deciding.map(({ run, log }) => element('div', { class: 'latest' },
       element('p', {}, `Latest decisions, ${run.title}`), log)));
     const cooperative = deciding.length > 0;
-    this.legend = coramp.replayLegend(this.runs[0], cooperative);
+    this.legend = coramp.replayLegend(this.runs[0], cooperative,
+      this.runs.some((run) => run.automated));
     this.box.append(this.place, this.legend,
       element('p', { class: 'hint' }, 'Lengths are to scale. Everyone drives to the right; the road goes on in the '
         + `row below. ${coramp.Replay.KEYS}`),

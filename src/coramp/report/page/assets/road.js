@@ -244,8 +244,19 @@ coramp.Road = class {
     ctx.restore();
   }
 
-  // A dot for who came by the ramp, a ring for who stands.
+  // A stripe for who is automated among drivers, a dot for who came by the ramp, a ring for who stands.
   markVehicle(ctx, i, speed, high) {
+    if (this.run.automated?.[i]) {
+      const long = this.run.length[i] * this.scale;
+      ctx.beginPath();
+      ctx.rect(-0.97 * long, -0.17 * high, 0.94 * long, 0.34 * high);
+      ctx.fillStyle = coramp.colour('automated');
+      ctx.fill();
+      ctx.strokeStyle = '#ffffff';
+      ctx.lineWidth = 1;
+      ctx.stroke();
+      ctx.strokeStyle = coramp.colour('outline');
+    }
     const middle = -0.68 * this.run.length[i] * this.scale;
     const round = (radius) => {
       ctx.beginPath();
