@@ -195,7 +195,14 @@ def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
     def may(rear_m):
         users = users_of([(100.0, 14.0, False, True), (rear_m, 20.0, True, False)])
         return may_change_lane(
-            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+            users,
+            0,
+            neighbours_of(users),
+            at_once(users),
+            users.speed_mps[0],
+            GAPS,
+            FOLLOWING,
+            SAFETY,
         )
 
     assert may(100.0 - 5.0 - 43.68)
@@ -206,7 +213,14 @@ def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_beh
     def may(*others):
         users = users_of([(100.0, 18.0, False, True), *others])
         return may_change_lane(
-            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+            users,
+            0,
+            neighbours_of(users),
+            at_once(users),
+            users.speed_mps[0],
+            GAPS,
+            FOLLOWING,
+            SAFETY,
         )
 
     assert may()
@@ -221,7 +235,14 @@ def test_nobody_changes_lanes_before_the_nose_or_from_the_mainline():
     for row in [(0.5, 16.0, False, True), (-20.0, 16.0, False, True), (50.0, 16.0, True, True)]:
         users = users_of([row])
         assert not may_change_lane(
-            users, 0, neighbours_of(users), at_once(users), GAPS, FOLLOWING, SAFETY
+            users,
+            0,
+            neighbours_of(users),
+            at_once(users),
+            users.speed_mps[0],
+            GAPS,
+            FOLLOWING,
+            SAFETY,
         )
 
 
