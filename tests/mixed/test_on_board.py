@@ -186,42 +186,35 @@ def test_the_largest_speed_that_keeps_the_distance():
     assert distance_speed_mps(4.0, 0.0, 0.0, 6.0, SAFETY) == pytest.approx(5.16712, abs=1e-5)
 
 
+def may_change(users, slowest_mps=None):
+    """Whether the first vehicle may change lanes; it may slow down until it is there."""
+    if slowest_mps is None:
+        slowest_mps = users.speed_mps[0]
+    around, ahead = neighbours_of(users), at_once(users)
+    return may_change_lane(users, 0, around, ahead, slowest_mps, GAPS, FOLLOWING, SAFETY)
+
+
 def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
     """By hand: at 20 behind 14 m/s he keeps 2.5 + 20 and brakes over (400 - 196)/9 = 22.667 m.
 
     That is 45.167 m, less 1.5 m: 43.667 m to the tail, 48.667 m to the front bumper.
     """
 
-    def may(rear_m):
+    def may(rear_m, slowest_mps):
         users = users_of([(100.0, 14.0, False, True), (rear_m, 20.0, True, False)])
-        return may_change_lane(
-            users,
-            0,
-            neighbours_of(users),
-            at_once(users),
-            users.speed_mps[0],
-            GAPS,
-            FOLLOWING,
-            SAFETY,
-        )
+        return may_change(users, slowest_mps)
 
-    assert may(100.0 - 5.0 - 43.68)
-    assert not may(100.0 - 5.0 - 43.65)
+    assert may(100.0 - 5.0 - 43.68, 14.0)
+    assert not may(100.0 - 5.0 - 43.65, 14.0)
+    # if it slows down to 13 m/s meanwhile, (400 - 169) / 9 = 25.667 m: 3 m more
+    assert may(100.0 - 5.0 - 46.68, 13.0)
+    assert not may(100.0 - 5.0 - 46.65, 13.0)
 
 
 def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_behind():
     def may(*others):
         users = users_of([(100.0, 18.0, False, True), *others])
-        return may_change_lane(
-            users,
-            0,
-            neighbours_of(users),
-            at_once(users),
-            users.speed_mps[0],
-            GAPS,
-            FOLLOWING,
-            SAFETY,
-        )
+        return may_change(users)
 
     assert may()
     assert may((140.0, 18.0, True, False), (60.0, 18.0, True, True))
@@ -234,16 +227,7 @@ def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_beh
 def test_nobody_changes_lanes_before_the_nose_or_from_the_mainline():
     for row in [(0.5, 16.0, False, True), (-20.0, 16.0, False, True), (50.0, 16.0, True, True)]:
         users = users_of([row])
-        assert not may_change_lane(
-            users,
-            0,
-            neighbours_of(users),
-            at_once(users),
-            users.speed_mps[0],
-            GAPS,
-            FOLLOWING,
-            SAFETY,
-        )
+        assert not may_change(users)
 
 
 def test_drivers_are_given_nothing_to_do():

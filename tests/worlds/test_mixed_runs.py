@@ -256,9 +256,8 @@ def test_automated_vehicles_keep_what_they_promise_and_go_where_they_are_sent(ke
     run, seen = kept
     assert run.summary["plan_error_m"] < 0.05
     assert run.summary["collisions_by_automated"] == 0
-    if run.spec.drivers == "fair":
-        assert run.summary["automated_violations"] == 0
-        assert run.broken_promises == []
+    assert run.summary["automated_violations"] == 0
+    assert run.broken_promises == []
     automated = set(run.vehicles.filter("automated")["vehicle_id"])
     if run.summary["broken_assumptions"] == 0:
         assert seen.shortest_stopping_m(automated, 6.0) > -0.5
