@@ -120,8 +120,9 @@ def test_an_unknown_key_names_the_keys_of_a_type():
     (line,) = problems(CAR, {**TRUCK, "lenght_m": 12.0})
     assert line == (
         "vehicle.1.lenght_m: unknown key; did you mean length_m? allowed are acceleration_mps2, "
-        "automated_share, braking_mps2, clock_error_s, fuel, length_m, mainline_share, mass_kg, name, "
-        "positioning_error_m, power_wpkg, ramp_share, share, sumo_class, time_gap_s, top_speed_mps"
+        "automated_share, braking_mps2, clock_error_s, fuel, length_m, mainline_share, mass_kg, "
+        "name, positioning_error_m, power_wpkg, ramp_share, share, sumo_class, time_gap_s, "
+        "top_speed_mps"
     )
 
 
