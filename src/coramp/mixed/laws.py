@@ -13,13 +13,13 @@ class FollowingLaw(NamedTuple):
     acceleration in a lane, ``merge_mps2`` that on the acceleration lane.
     """
 
-    gap_gain_ps2: float = 0.48
+    gap_gain_ps2: float = 0.22
     speed_gain_ps: float = 1.0
     courtesy_gap_gain_ps2: float = 0.2
     courtesy_speed_gain_ps: float = 1.0
     courtesy_mps2: float = 2.5
-    early_share: float = 0.5
-    early_s: float = 3.5
+    early_share: float = 0.27
+    early_s: float = 14.0
     speed_up_mps2: float = 2.5
     merge_mps2: float = 2.05
 
@@ -42,7 +42,7 @@ class SequenceLaw(NamedTuple):
     deep: float = 6.0
     behind_m: float = 100.0
     ahead_m: float = 117.0
-    slowest_share: float = 0.6
+    slowest_share: float = 0.63
     slowest_ramp_share: float = 0.9
     urgent_m: float = 100.0
     urgent_mps: float = 3.0
@@ -60,11 +60,11 @@ class SafetyLaw(NamedTuple):
 
     braking_mps2: float = 6.0
     reaction_s: float = 0.3
-    margin_m: float = 1.35
+    margin_m: float = 1.2
     hardest_mps2: float = 8.0
-    stop_mps2: float = 1.9
+    stop_mps2: float = 1.65
     lane_end_m: float = 197.0
     driver_mps2: float = 4.5
-    relax_m: float = 1.5
-    gentle_mps2: float = 0.6
+    relax_m: float = 0.96
+    gentle_mps2: float = 0.68
     gentle_at_end_mps2: float = 5.0

@@ -18,9 +18,9 @@ from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
 
 LANE_END_M = 3.0
 """An automated vehicle that has not merged stands so far before the acceleration lane ends."""
-MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.3
+MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.22
 """How much more than behind an automated vehicle one keeps behind a driver."""
-MORE_FOR_DRIVER_S = 0.3
+MORE_FOR_DRIVER_S = 0.34
 """How much more than a driver's own gap room for one who merges has."""
 TRUCK_BRAKING_MPS2 = 5.0
 """What the brakes of a heavy vehicle must do (UN Regulation 13, type 0 test)."""
