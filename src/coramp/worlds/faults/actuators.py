@@ -9,6 +9,7 @@ from coramp._kernel import FloatArray, IntArray
 from coramp.scenarios.world_sections import Actuators
 
 LARGEST_EXPONENT = 700.0
+ROUNDING_STEPS = 1e-6
 
 
 @dataclass
@@ -26,8 +27,11 @@ class SlowActuators:
     _queue: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Everyone cruises; the queue holds the commands of the dead time, oldest first."""
-        steps = round(self.section.dead_time_s / self.step_s)
+        """Everyone cruises; the queue holds the commands of the dead time, oldest first.
+
+        A dead time that is no multiple of the step counts as the next larger one.
+        """
+        steps = math.ceil(self.section.dead_time_s / self.step_s - ROUNDING_STEPS)
         self._accel_mps2 = np.zeros(self.vehicles)
         self._queue = np.zeros((steps, self.vehicles))
 
