@@ -21,6 +21,7 @@ from coramp.equations.printed import in_words
 from coramp.explain.quantity import Quantity, printed_equations
 from coramp.explain.story import Story, told
 from coramp.records.schemas import Row
+from coramp.records.world_told import told_of_world
 from coramp.runs.running import finite_or_none
 from coramp.studies.outlook import Outlook
 from coramp.studies.speed_unit import MPS, SpeedUnit
@@ -94,6 +95,8 @@ def print_run(
 ) -> None:
     """Prints the summary of a run, with speeds in a unit, and where its records lie."""
     print_table(run_table(result.summary, unit), wide)
+    if told_of := told_of_world(result):
+        print(f"The world: {told_of}.")
     if out is not None:
         told = f"coramp explain {out} VEHICLE explains one vehicle's plan"
         if result.decisions is None:

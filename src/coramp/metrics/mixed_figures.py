@@ -69,12 +69,14 @@ def findings_in(outcome: Outcome, scenario: Scenario) -> Findings:
         passages.length_m,
         automated,
     )
-    return findings_of(seen, limits_of(scenario.drivers[outcome.drivers]), outcome.collided)
+    return findings_of(
+        seen, limits_of(scenario, scenario.drivers[outcome.drivers]), outcome.collided
+    )
 
 
-def limits_of(drivers: DriverPopulation) -> Limits:
-    """Returns what automated vehicles reckon with among these drivers."""
-    law = SafetyLaw()
+def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:
+    """Returns what automated vehicles reckon with on this road, among these drivers."""
+    law = SafetyLaw().on(scenario.road.assumed_braking_mps2)
     return Limits(law.braking_mps2, drivers.min_gap_m, max(drivers.taus_s), law.relax_m)
 
 

@@ -64,10 +64,10 @@ def _queued(outcome: Outcome, station_m: float, least_mps: float, intervals: int
     """
     passages, driven = outcome.passages, outcome.driven
     time_s, speed_mps = crossings(driven, np.flatnonzero(~passages.on_ramp), station_m)
-    place = (time_s / INTERVAL_S).astype(np.int64)
-    inside = place < intervals
-    sums = np.bincount(place[inside], speed_mps[inside], minlength=intervals)
-    counts = np.bincount(place[inside], minlength=intervals)
+    inside = time_s < intervals * INTERVAL_S
+    place = (time_s[inside] / INTERVAL_S).astype(np.int64)
+    sums = np.bincount(place, speed_mps[inside], minlength=intervals)
+    counts = np.bincount(place, minlength=intervals)
     queued = np.zeros(intervals, np.bool_)
     for k in range(intervals):
         queued[k] = sums[k] < least_mps * counts[k] if counts[k] else k > 0 and queued[k - 1]
@@ -98,5 +98,6 @@ def crossings(
     square = speed_mps**2 + 2.0 * rows[here, ACCEL] * left_m
     passing_mps = np.sqrt(np.maximum(0.0, square))
     passes = (speed_mps + passing_mps > 0.0) & ((square >= 0.0) | ~last[here])
-    taken_s = 2.0 * left_m[passes] / (speed_mps + passing_mps)[passes]
+    with np.errstate(over="ignore"):  # who creeps arrives never
+        taken_s = 2.0 * left_m[passes] / (speed_mps + passing_mps)[passes]
     return rows[here, TIME][passes] + taken_s, passing_mps[passes]

@@ -68,3 +68,11 @@ class SafetyLaw(NamedTuple):
     relax_m: float = 0.96
     gentle_mps2: float = 0.68
     gentle_at_end_mps2: float = 5.0
+
+    def on(self, most_braking_mps2: float) -> "SafetyLaw":
+        """Returns the law on a road on which nobody is taken to brake harder than that."""
+        return self._replace(
+            braking_mps2=min(self.braking_mps2, most_braking_mps2),
+            stop_mps2=min(self.stop_mps2, most_braking_mps2),
+            driver_mps2=min(self.driver_mps2, most_braking_mps2),
+        )

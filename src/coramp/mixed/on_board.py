@@ -113,8 +113,10 @@ def may_change_lane(
     gentle_mps2 = law.gentle_mps2 + law.gentle_at_end_mps2 * share * share
     if front >= 0:
         free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
-        spare_mps = _keeps_mps(users, own, front, ahead, law) - ahead.speed_mps[own]
-        if free_m < TOUCHING_M or spare_mps < 0.0:
+        keeps_mps = _keeps_mps(users, own, front, ahead, law)
+        if free_m < TOUCHING_M or keeps_mps < ahead.speed_mps[own]:
+            return False
+        if keeps_mps == 0.0 and free_m - ahead.way_m[own] < TOUCHING_M:
             return False
         if _follows_mps2(users, own, front, ahead, gaps, following) < -gentle_mps2:
             return False
@@ -126,9 +128,12 @@ def may_change_lane(
         braking_m = (rear_mps**2 - slowest_mps**2) / (2.0 * law.driver_mps2)
         needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
         return bool(free_m >= max(TOUCHING_M, needs_m))
-    spare_mps = _keeps_mps(users, rear, own, ahead, law) - ahead.speed_mps[rear]
+    keeps_mps = _keeps_mps(users, rear, own, ahead, law)
+    spare_mps = keeps_mps - ahead.speed_mps[rear]
     if free_m < TOUCHING_M or spare_mps < -REAR_BRAKES_MPS2 * law.reaction_s:
         return False
+    if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < TOUCHING_M:
+        return False  # it would only come to a stand beyond
     return bool(_follows_mps2(users, rear, own, ahead, gaps, following) >= -gentle_mps2)
 
 

@@ -1,5 +1,6 @@
 """Runs in which automated vehicles drive among drivers: what they may ask for and promise."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from coramp.scenarios.world_sections import TABLES
 from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
+from coramp.worlds.sumo.mixed_setup import safety_law_of
 
 
 def coordinates_drivers(strategy: type[Strategy]) -> bool:
@@ -26,12 +28,36 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
         raise CorampError(
             f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, or {instead}"
         )
+    if coordinates_drivers(strategy) and (line := _lag_problem(scenario)):
+        raise CorampError(line)
     integrator = scenario.drivers[population].integrator
     if scenario.has_automated and integrator != "euler":
         raise CorampError(
             f"drivers.{population}.integrator: {integrator} drivers are others than Euler's, and "
             "automated vehicles among them take Euler steps; allowed is euler"
         )
+
+
+def _lag_problem(scenario: Scenario) -> str:
+    """What is wrong with automated vehicles that react too late for this road, else nothing.
+
+    Who passes the nose at v_R must still be able to stop before the acceleration lane ends:
+    v_R t + v_R^2 / (2 b) <= the lane, with t the reaction and the time until a command acts.
+    """
+    actuators, speed_mps = scenario.actuators, scenario.ramp.speed_mps
+    delay_s = actuators.dead_time_s + actuators.lag_s
+    law = safety_law_of(scenario, scenario.control.step_s)
+    left_m = law.lane_end_m - speed_mps**2 / (2.0 * law.stop_mps2)
+    most_s = max(0.0, math.floor(100.0 * (left_m / speed_mps - law.reaction_s)) / 100.0)
+    if delay_s == 0.0 or delay_s <= most_s:
+        return ""
+    key = "lag_s" if actuators.lag_s >= actuators.dead_time_s else "dead_time_s"
+    return (
+        f"actuators.{key}: who reacts {delay_s:g} s late and passes the nose at ramp.speed_mps "
+        f"{speed_mps:g} cannot stop before ramp.acceleration_lane_m "
+        f"{scenario.ramp.acceleration_lane_m:g} ends; allowed are dead_time_s and lag_s of up to "
+        f"{most_s:g} s together"
+    )
 
 
 def check_messages_kept(is_mixed: bool) -> None:

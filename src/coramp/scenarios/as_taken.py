@@ -10,6 +10,8 @@ from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import KMH_PER_MPS, data_in_mps
 from coramp.scenarios.toml_files import override_text, read
+from coramp.scenarios.world_sections import PRESETS, Section
+from coramp.scenarios.world_sections import TABLES as OF_THE_WORLD
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
 TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation", "traffic")
@@ -50,7 +52,8 @@ def taken(name: str) -> tuple[Scenario, list[Taken]]:
     """
     scenario = load_scenario(name)
     data, _ = data_in_mps(read("scenarios", name)[1], name)
-    return scenario, list(_keys(scenario, data))
+    chosen = PRESETS[scenario.world.preset] if scenario.world.preset else {}
+    return scenario, [*_keys(scenario, data), *_keys_of_world(scenario, data, chosen)]
 
 
 def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
@@ -73,6 +76,26 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
                 why = "of the list of arrivals"
             else:
                 why = _from(f"{table}.{key}") if field.is_required() else DEFAULT
+            yield Taken(f"{table}.{key}", value, why)
+
+
+def _keys_of_world(
+    scenario: Scenario, data: Mapping[str, Any], chosen: Mapping[str, Any]
+) -> Iterator[Taken]:
+    """Every key of a table that is not off, and where a preset gave it, that it did."""
+    preset = scenario.world.preset
+    for table in OF_THE_WORLD:
+        model: Section = getattr(scenario, table)
+        if model.is_perfect and table not in data:
+            continue
+        for key, value in model.model_dump().items():
+            if value is None:
+                continue
+            why = DEFAULT if value == type(model).model_fields[key].default else None
+            if key in data.get(table, {}):
+                why = None
+            elif key in chosen.get(table, {}):
+                why = f"{FOLLOWS} world.preset {preset}"
             yield Taken(f"{table}.{key}", value, why)
 
 

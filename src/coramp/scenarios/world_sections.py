@@ -3,9 +3,12 @@
 Each is off where it is left out. They act on automated vehicles among drivers, in SUMO.
 """
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from coramp.equations.conflict_risk import GRAVITY_MPS2
 
 Part = Annotated[float, Field(ge=0.0, le=1.0)]
 Metres = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -98,13 +101,22 @@ class Actuators(Section):
 class RoadSurface(Section):
     """What the road lets tyres do: ``adhesion`` as it is, ``assumed_adhesion`` as vehicles take it.
 
-    Both are shares of the weight; braking is limited to adhesion times g. ``grade`` is the share
-    by which the road climbs.
+    Both are shares of the weight. Nobody brakes harder than adhesion times g; automated vehicles
+    reckon with no harder braking than assumed adhesion times g, their own and others'.
     """
 
     adhesion: Annotated[float, Field(gt=0.0, le=1.2)] | None = None
     assumed_adhesion: Annotated[float, Field(gt=0.0, le=1.2)] | None = None
-    grade: Annotated[float, Field(ge=-0.1, le=0.1)] = 0.0
+
+    @property
+    def most_braking_mps2(self) -> float:
+        """What tyres can do (m/s2, positive), infinity for no limit."""
+        return math.inf if self.adhesion is None else self.adhesion * GRAVITY_MPS2
+
+    @property
+    def assumed_braking_mps2(self) -> float:
+        """What automated vehicles take tyres to do (m/s2, positive), infinity for no limit."""
+        return math.inf if self.assumed_adhesion is None else self.assumed_adhesion * GRAVITY_MPS2
 
 
 class Behaviour(Section):
@@ -132,8 +144,8 @@ class Behaviour(Section):
 class Incidents(Section):
     """A vehicle breaks down: the next one to reach a station after a time stops there.
 
-    ``place`` is the mainline or the ramp with its acceleration lane. It drives on
-    after ``lasts_s``.
+    ``place`` is the mainline or the ramp with its acceleration lane. It brakes softly enough to
+    come to a stand at the station, changes no lane, and drives on after ``lasts_s``.
     """
 
     breakdown_s: Annotated[float, Field(ge=0.0, le=86400.0)] | None = None

@@ -6,11 +6,13 @@ from typing import Any
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
 from coramp.records.schemas import MIXED_METRICS, Row
+from coramp.records.world_told import told_of_world
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
 from coramp.road.streams import STREAMS
 from coramp.runs.running import broken_promises
+from coramp.scenarios.world_sections import TABLES
 from coramp.studies.metric_labels import LABELS, RUNG_COLUMNS, in_unit, label_of, typeset
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
@@ -125,6 +127,7 @@ def asked_table(run: RunRecords, unit: SpeedUnit = MPS) -> Table:
         ("arrivals", _arrivals(run)),
         ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
         *_kinds(run),
+        *_world(run),
         ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
     )
     return Table("Road, traffic and errors of this run", ("what", "value"), rows)
@@ -137,6 +140,17 @@ def _kinds(run: RunRecords) -> tuple[tuple[str, str], ...]:
     automated = run.vehicles["automated"].sum()
     others = run.vehicles.height - automated
     return (("vehicles", f"{automated} automated, {others} with {run.summary['drivers']} drivers"),)
+
+
+def _world(run: RunRecords) -> tuple[tuple[str, str], ...]:
+    """What of the world was not perfect, and what came of it."""
+    scenario, preset = run.scenario, run.scenario.world.preset
+    tables = ", ".join(f"[{t}]" for t in TABLES if not getattr(scenario, t).is_perfect)
+    if not tables:
+        return ()
+    asked = f"{preset}: {tables}" if preset else tables
+    happened = told_of_world(run)
+    return (("world", f"{asked}; {happened}" if happened else asked),)
 
 
 def _arrivals(run: RunRecords) -> str:

@@ -1,7 +1,8 @@
 """A run as a page shows it: plain data of where all vehicles are, and why."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -9,6 +10,7 @@ import polars as pl
 from coramp.explain.story import quantities_in, told, tried_in
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
+from coramp.records.world_told import HAPPENED
 from coramp.report.style import look_of
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import CAR
@@ -72,6 +74,7 @@ def page_data(run: RunRecords) -> Row:
             }
             for row in _rows(run.violations)
         ],
+        "events": _events(run, place_of),
     }
 
 
@@ -129,6 +132,17 @@ def _types(run: RunRecords) -> list[str]:
     if "vehicle_type" in run.vehicles.columns:
         return run.vehicles["vehicle_type"].to_list()
     return [CAR] * run.vehicles.height
+
+
+def _events(run: RunRecords, place_of: Mapping[str, int]) -> list[dict[str, Any]]:
+    """What happened by itself, for the time axis of the replay."""
+    if run.safety_events is None:
+        return []
+    own = run.safety_events.filter(pl.col("event").is_in(list(HAPPENED)))
+    return [
+        {"time": round(time_s, 3), "what": what, "vehicle": place_of[name]}
+        for time_s, what, name in own.select("time_s", "event", "rear_vehicle_id").rows()
+    ]
 
 
 def _automated(run: RunRecords) -> list[int] | None:

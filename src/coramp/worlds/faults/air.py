@@ -4,7 +4,9 @@ In a perfect world both is all that there is, at once. Otherwise reports and com
 positions and clocks are wrong, and what was heard last is carried on from its time.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from coramp.demand.arrivals import generator
 from coramp.mixed.situation import Steering
 from coramp.mixed.users import RoadUsers
 from coramp.scenarios.model import Scenario
-from coramp.worlds.faults.link import LossyLink
+from coramp.worlds.faults.link import ROUNDING_S, LossyLink
 from coramp.worlds.faults.positions import WrongClocks, WrongPositions
 
 NUMBER, STAMP, STATION, SPEED, ON_MAINLINE = range(5)
@@ -21,6 +23,8 @@ NUMBER, STAMP, STATION, SPEED, ON_MAINLINE = range(5)
 GIVEN, MOST, MERGE = 1, 2, 3
 """Columns of a command, after the number of its vehicle."""
 BEYOND_M = 20.0
+STANDS_MPS = 0.5
+"""Slower than this a vehicle that goes by itself may merge, lest it block the ramp for ever."""
 
 
 @dataclass
@@ -47,24 +51,29 @@ class Air:
     def __post_init__(self) -> None:
         """Each fault draws from random numbers of its own."""
         scenario, count = self.scenario, len(self.reporting)
-        self._reports = LossyLink(scenario.reports, count, self._random("reports"))
-        self._commands = LossyLink(scenario.commands, count, self._random("commands"))
-        self._positions = WrongPositions(scenario.positioning, count, self._random("positioning"))
-        self._clocks = WrongClocks(scenario.clock, count, self._random("clock"))
+        self._reports = LossyLink(scenario.reports, count, self._random_of("reports"))
+        self._commands = LossyLink(scenario.commands, count, self._random_of("commands"))
+        positioning = self._random_of("positioning")
+        self._positions = WrongPositions(scenario.positioning, count, positioning)
+        self._clocks = WrongClocks(scenario.clock, count, self._random_of("clock"))
         self._known, self._command = np.full((count, 5), np.nan), np.full((count, 4), np.nan)
         self._reported_s, self._overdue = np.full(count, -np.inf), np.zeros(count, np.bool_)
         self._draw_characters(count)
 
-    def _random(self, fault: str) -> np.random.Generator:
-        return generator(self.seed, f"faults/{fault}")
+    def _random_of(self, table: str) -> Callable[[str], np.random.Generator]:
+        return partial(_random_of, self.seed, table)
 
     def _draw_characters(self, count: int) -> None:
         """Who falls silent when, who lies, who disobeys: automated vehicles alone."""
         behaviour, horizon_s = self.scenario.behaviour, self.scenario.simulation.horizon_s
-        random = self._random("behaviour")
-        silent, lies, disobeys = random.random((3, count))
+        random_of = self._random_of("behaviour")
+        (silent, since), lies, disobeys = (
+            random_of("silent").random((2, count)),
+            random_of("lies").random(count),
+            random_of("disobeys").random(count),
+        )
         chosen = self.automated & (silent < behaviour.silent_share)
-        self._silent_from_s = np.where(chosen, random.random(count) * horizon_s, np.inf)
+        self._silent_from_s = np.where(chosen, since * horizon_s, np.inf)
         lies_m = np.where(lies < behaviour.lies_share, behaviour.lie_m, 0.0)
         self._lie_m = np.where(self.automated, lies_m, 0.0)
         self._disobeys = self.automated & (disobeys < behaviour.disobeys_share)
@@ -93,7 +102,7 @@ class Air:
         period_s = self.scenario.reports.period_s or 0.0
         number = users.number
         due = self.reporting[number] & (now_s < self._silent_from_s[number])
-        due &= now_s - self._reported_s[number] >= period_s - 1e-9
+        due &= now_s - self._reported_s[number] >= period_s - ROUNDING_S
         own = number[due]
         self._reported_s[own] = now_s
         error_m = self._positions.error_m(own, now_s) + self._lie_m[own]
@@ -102,7 +111,7 @@ class Air:
                 own.astype(np.float64),
                 now_s + self._clocks.error_s(own, now_s),
                 users.station_m[due] + error_m,
-                np.maximum(0.0, users.speed_mps[due] + self._positions.speed_error_mps(len(own))),
+                np.maximum(0.0, users.speed_mps[due] + self._positions.speed_error_mps(own)),
                 users.on_mainline[due].astype(np.float64),
             ]
         )
@@ -152,25 +161,28 @@ class Air:
     def told(self, now_s: float, users: RoadUsers) -> tuple[FloatArray, BoolArray]:
         """Returns the bound (m/s2) that each vehicle on the road has, and who may merge.
 
-        What is older than what a vehicle has changes nothing. A vehicle whose last command is
-        overdue goes by itself: it keeps its distances, and does not merge.
+        What is older than what a vehicle has changes nothing, and one that is silent hears nothing.
+        A vehicle whose last command is overdue goes by itself: it keeps its distances, and does not
+        merge before it stands.
         """
         for row in self._commands.received(now_s):
             number = int(row[NUMBER])
-            if not row[GIVEN] <= self._command[number, GIVEN]:
+            if (
+                now_s < self._silent_from_s[number]
+                and not row[GIVEN] <= self._command[number, GIVEN]
+            ):
                 self._command[number] = row
         command = self._command[users.number]
-        valid_s = self.scenario.commands.valid_s
-        obeys = command[:, GIVEN] >= now_s - valid_s - 1e-9
-        obeys &= ~self._disobeys[users.number] & users.automated
-        obeys &= now_s < self._silent_from_s[users.number]
-        self._count_fallbacks(users, obeys, command)
+        valid = command[:, GIVEN] >= now_s - self.scenario.commands.valid_s - ROUNDING_S
+        self._count_fallbacks(users, valid, command)
+        obeys = valid & ~self._disobeys[users.number] & users.automated
         most_mps2 = np.where(obeys, command[:, MOST], np.inf)
-        return most_mps2, obeys & (command[:, MERGE] > 0.5)
+        alone = users.automated & ~obeys & (users.speed_mps < STANDS_MPS)
+        return most_mps2, alone | obeys & (command[:, MERGE] > 0.5)
 
-    def _count_fallbacks(self, users: RoadUsers, obeys: BoolArray, command: FloatArray) -> None:
-        """Counts each time that a vehicle which had commands goes by itself."""
-        overdue = users.automated & ~obeys & ~np.isnan(command[:, GIVEN])
+    def _count_fallbacks(self, users: RoadUsers, valid: BoolArray, command: FloatArray) -> None:
+        """Counts each time that the last command of a vehicle runs out."""
+        overdue = users.automated & ~valid & ~np.isnan(command[:, GIVEN])
         self.fallbacks += int((overdue & ~self._overdue[users.number]).sum())
         self._overdue[users.number] = overdue
 
@@ -184,3 +196,8 @@ class Air:
             "commands_lost": self._commands.lost,
             "fallbacks": self.fallbacks,
         }
+
+
+def _random_of(seed: int, table: str, fault: str) -> np.random.Generator:
+    """Random numbers of one fault of a table, whatever else is switched on."""
+    return generator(seed, f"faults/{table}/{fault}")

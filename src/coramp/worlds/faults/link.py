@@ -1,5 +1,6 @@
 """A link that delivers messages late, twice, out of order or not at all."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,36 +16,47 @@ class LossyLink:
     """Carries rows of numbers, a column ``(number of the vehicle, ...)`` each, between two ends.
 
     ``vehicles`` is how many there are: each has a state of its own where losses come in bursts.
+    ``random_of`` returns random numbers by a fault's name. Each time is drawn for all vehicles,
+    whoever sends, so that neither another fault nor who is on the road changes a vehicle's draws.
     """
 
     section: Link
     vehicles: int
-    random: np.random.Generator
+    random_of: Callable[[str], np.random.Generator]
     sent: int = 0
     lost: int = 0
     _due_s: FloatArray = field(default_factory=lambda: np.empty(0))
     _rows: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     _bad: BoolArray = field(init=False)
     _asked_s: FloatArray = field(init=False)
+    _loss: np.random.Generator = field(init=False)
+    _twice: np.random.Generator = field(init=False)
+    _delay: np.random.Generator = field(init=False)
+    _delay_of_second: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
         """Every link begins in a good phase."""
         self._bad = np.zeros(self.vehicles, np.bool_)
         self._asked_s = np.zeros(self.vehicles)
+        self._loss, self._twice = self.random_of("loss"), self.random_of("duplicates")
+        self._delay, self._delay_of_second = self.random_of("delay"), self.random_of("delay twice")
 
     def send(self, now_s: float, rows: FloatArray) -> None:
         """Sends rows at a time; what is lost, late or doubled is drawn now."""
-        arrives = ~self._lost(now_s, rows[:, 0].astype(np.int64))
+        number = rows[:, 0].astype(np.int64)
+        arrives = ~self._lost(now_s, number)
         self.sent += len(rows)
         self.lost += int((~arrives).sum())
-        kept = rows[arrives]
+        due_s = [now_s + self._latency_s(self._delay, number)[arrives]]
+        kept = [rows[arrives]]
         if self.section.duplicates > 0.0:
-            twice = self.random.random(len(kept)) < self.section.duplicates
-            kept = np.concatenate([kept, kept[twice]])
-        due_s = now_s + self._latency_s(len(kept))
+            twice = self._twice.random(self.vehicles)[number] < self.section.duplicates
+            twice &= arrives
+            due_s.append(now_s + self._latency_s(self._delay_of_second, number)[twice])
+            kept.append(rows[twice])
         waiting = self._rows.reshape(-1, rows.shape[1])
-        self._due_s = np.concatenate([self._due_s, due_s])
-        self._rows = np.concatenate([waiting, kept])
+        self._due_s = np.concatenate([self._due_s, *due_s])
+        self._rows = np.concatenate([waiting, *kept])
 
     def received(self, now_s: float) -> FloatArray:
         """Returns the rows that have arrived since this was last asked, in order of arrival."""
@@ -54,12 +66,12 @@ class LossyLink:
         self._due_s, self._rows = self._due_s[~there], self._rows[~there]
         return rows
 
-    def _latency_s(self, count: int) -> FloatArray:
+    def _latency_s(self, random: np.random.Generator, number: IntArray) -> FloatArray:
         section = self.section
         if section.delay_shape is None or section.delay_s == 0.0:
-            return np.full(count, section.delay_s)
+            return np.full(len(number), section.delay_s)
         scale_s = section.delay_s / section.delay_shape
-        return np.asarray(self.random.gamma(section.delay_shape, scale_s, count))
+        return np.asarray(random.gamma(section.delay_shape, scale_s, self.vehicles)[number])
 
     def _lost(self, now_s: float, number: IntArray) -> BoolArray:
         """Which messages are lost: each for itself, or all in a bad phase of a vehicle's link.
@@ -71,11 +83,11 @@ class LossyLink:
         if section.loss == 0.0:
             return np.zeros(len(number), np.bool_)
         if section.burst_s is None:
-            return np.asarray(self.random.random(len(number)) < section.loss)
+            return np.asarray(self._loss.random(self.vehicles)[number] < section.loss)
         rate_ps = 1.0 / section.burst_s + section.loss / (section.burst_s * (1.0 - section.loss))
         forgets = np.exp(-rate_ps * (now_s - self._asked_s[number]))
         was_bad = self._bad[number].astype(np.float64)
         chance = section.loss + (was_bad - section.loss) * forgets
-        bad = self.random.random(len(number)) < chance
+        bad = self._loss.random(self.vehicles)[number] < chance
         self._bad[number], self._asked_s[number] = bad, now_s
         return np.asarray(bad)

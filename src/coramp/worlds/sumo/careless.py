@@ -15,8 +15,11 @@ from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan
 from coramp.worlds.sumo.session import Session
 
 SECONDS_AN_HOUR = 3600.0
-STOPS_MPS2 = 3.0
-"""A vehicle that breaks down rolls to a stop with this."""
+STOPS_MPS2, STOPS_AT_MOST_MPS2 = 3.0, 4.0
+"""A vehicle that breaks down rolls to a stop with this, and at a look too late with more."""
+STOPS_EARLY_S, STOPS_WITHIN_M = 0.3, 1.0
+"""It begins so early that it is not too late at the next look, and stops so near the station."""
+LEAST_LEFT_M = 0.1
 LOOK_STEPS = 2
 NEAR_M = (-300.0, 150.0)
 """Where drivers brake for nothing: before and beside the acceleration lane."""
@@ -35,6 +38,7 @@ class Careless:
     """What drivers do without reason, and the breakdown of a vehicle, in one run.
 
     ``stopped_until_s`` tells of automated vehicles that have broken down, by number.
+    Who brakes for nothing has random numbers of its own, whatever the waits in between are.
     """
 
     scenario: Scenario
@@ -42,14 +46,16 @@ class Careless:
     seed: int
     stopped_until_s: dict[int, float] = field(default_factory=dict)
     events: list[tuple[float, str, int]] = field(default_factory=list)
-    _random: np.random.Generator = field(init=False)
+    _waits: np.random.Generator = field(init=False)
+    _choices: np.random.Generator = field(init=False)
     _next_brake_s: float = field(init=False)
     _forced: dict[str, Forced] = field(default_factory=dict)
     _broken: bool = False
 
     def __post_init__(self) -> None:
         """The first time at which a driver brakes for nothing is drawn."""
-        self._random = generator(self.seed, "faults/careless")
+        self._waits = generator(self.seed, "faults/careless/waits")
+        self._choices = generator(self.seed, "faults/careless/choices")
         self._next_brake_s = self._wait_s()
 
     @property
@@ -62,7 +68,7 @@ class Careless:
         rate_ph = self.scenario.behaviour.brakes_for_nothing_per_h
         if rate_ph == 0.0:
             return np.inf
-        return float(self._random.exponential(SECONDS_AN_HOUR / rate_ph))
+        return float(self._waits.exponential(SECONDS_AN_HOUR / rate_ph))
 
     def act(self, now_s: float, seen: "Road") -> None:
         """Lets happen what is due, and ends what is over."""
@@ -73,9 +79,8 @@ class Careless:
                 del self._forced[name]
             elif now_s >= forced.there_s:
                 self.session.hold(name, forced.speed_mps)
-        if now_s >= self._next_brake_s:
-            self._brake_for_nothing(now_s, seen)
-            self._next_brake_s = now_s + self._wait_s()
+        if now_s >= self._next_brake_s and self._brake_for_nothing(now_s, seen):
+            self._next_brake_s += self._wait_s()
         incidents = self.scenario.incidents
         due = incidents.breakdown_s is not None and now_s >= incidents.breakdown_s
         if due and not self._broken:
@@ -97,53 +102,71 @@ class Careless:
             ),
         )
 
-    def _brake_for_nothing(self, now_s: float, seen: "Road") -> None:
-        """One driver on the mainline near the merge brakes hard; which one is drawn."""
+    def _brake_for_nothing(self, now_s: float, seen: "Road") -> bool:
+        """One driver on the mainline near the merge brakes hard; which one is drawn.
+
+        Returns whether there was one.
+        """
         low_m, high_m = NEAR_M
         near = ~seen.automated & seen.on_mainline
         near &= (seen.station_m > low_m) & (seen.station_m < high_m)
         chosen = np.flatnonzero(near)
+        chosen = chosen[[seen.names[i] not in self._forced for i in chosen.tolist()]]
         if len(chosen) == 0:
-            return
+            return False
         behaviour = self.scenario.behaviour
-        i = int(self._random.choice(chosen))
-        then_mps = max(0.0, float(seen.speed_mps[i]) - behaviour.brake_mps2 * behaviour.brake_s)
-        braking_s = (float(seen.speed_mps[i]) - then_mps) / behaviour.brake_mps2
+        i = int(chosen[int(self._choices.random() * len(chosen))])
+        brake_mps2 = min(behaviour.brake_mps2, self.scenario.road.most_braking_mps2)
+        then_mps = max(0.0, float(seen.speed_mps[i]) - brake_mps2 * behaviour.brake_s)
+        braking_s = (float(seen.speed_mps[i]) - then_mps) / brake_mps2
         self._force(
             seen.names[i], Forced(then_mps, now_s + braking_s, now_s + behaviour.brake_s), now_s
         )
         self.events.append((now_s, "driver brakes for nothing", int(seen.number[i])))
+        return True
 
     def _break_down(self, now_s: float, seen: "Road") -> None:
-        """The vehicle that has last passed the station stops where it is."""
+        """The vehicle that is about to reach the station brakes, so that it stops there."""
         incidents = self.scenario.incidents
-        before = seen.on_mainline == (incidents.place == "mainline")
-        before &= seen.station_m >= incidents.station_m
+        left_m = incidents.station_m - seen.station_m
+        stops_m = seen.speed_mps**2 / (2.0 * STOPS_MPS2)
+        before = (seen.on_mainline == (incidents.place == "mainline")) & (left_m > 0.0)
+        before &= left_m <= stops_m + seen.speed_mps * STOPS_EARLY_S + STOPS_WITHIN_M
+        before &= left_m >= stops_m * STOPS_MPS2 / STOPS_AT_MOST_MPS2
         candidates = np.flatnonzero(before)
         if len(candidates) == 0:
             return
-        i = int(candidates[np.argmin(seen.station_m[candidates])])
+        i = int(candidates[np.argmin(left_m[candidates])])
         self._broken = True
-        end_s = now_s + incidents.lasts_s
+        stops_s = self.scenario.control.step_s
+        if seen.speed_mps[i] > 0.0:
+            stops_s = max(stops_s, 2.0 * float(left_m[i] / seen.speed_mps[i]))
+        end_s = now_s + stops_s + incidents.lasts_s
         self.events.append((now_s, "vehicle breaks down", int(seen.number[i])))
         if seen.automated[i]:
             self.stopped_until_s[int(seen.number[i])] = end_s
             return
-        stops_s = max(self.scenario.control.step_s, float(seen.speed_mps[i]) / STOPS_MPS2)
         self._force(seen.names[i], Forced(0.0, now_s + stops_s, end_s), now_s)
 
     def _force(self, name: str, forced: Forced, now_s: float) -> None:
         self.session.force(name, forced.speed_mps, forced.there_s - now_s)
         self._forced[name] = forced
 
-    def with_breakdown(self, now_s: float, number: IntArray, accel_mps2: FloatArray) -> FloatArray:
-        """Returns accelerations (m/s2) in which an automated vehicle that broke down stops."""
+    def broken_down(self, now_s: float, number: IntArray) -> BoolArray:
+        """Returns which automated vehicles stand, or brake, because they have broken down."""
         if not self.stopped_until_s:
+            return np.zeros(len(number), np.bool_)
+        until_s = self.stopped_until_s
+        return np.array([now_s < until_s.get(n, -np.inf) for n in number.tolist()], np.bool_)
+
+    def with_breakdown(self, now_s: float, users: RoadUsers, accel_mps2: FloatArray) -> FloatArray:
+        """Returns accelerations (m/s2) in which an automated vehicle that broke down stops."""
+        stopped = self.broken_down(now_s, users.number)
+        if not stopped.any():
             return accel_mps2
-        stopped = np.array(
-            [now_s < self.stopped_until_s.get(n, -np.inf) for n in number.tolist()], np.bool_
-        )
-        return np.where(stopped, np.minimum(accel_mps2, -STOPS_MPS2), accel_mps2)
+        left_m = np.maximum(LEAST_LEFT_M, self.scenario.incidents.station_m - users.station_m)
+        braking_mps2 = np.minimum(STOPS_AT_MOST_MPS2, users.speed_mps**2 / (2.0 * left_m))
+        return np.where(stopped, np.minimum(accel_mps2, -braking_mps2), accel_mps2)
 
 
 @dataclass(frozen=True)

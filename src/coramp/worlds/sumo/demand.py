@@ -19,6 +19,11 @@ PROFILE_MPS = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
 """Speeds at which a driver's acceleration is given to SUMO, which interpolates."""
 
 
+SUMO_BRAKING_MPS2 = {"passenger": (4.5, 9.0)}
+HEAVY_BRAKING_MPS2 = 4.0, 7.0
+"""SUMO's own braking by class, in comfort and at most."""
+
+
 @dataclass(frozen=True)
 class Automated:
     """Who is automated, one entry an arrival, and how SUMO's drivers know such vehicles.
@@ -123,7 +128,7 @@ def driver_routes(
             name += f"-{arrival.vehicle_type}"
         name += _carelessness_name(own)
         size = f'length="{arrival.length_m!r}" {_wish(drivers, wish_mps)}'
-        manners = f"{_manners(drivers, own)}{_ability(drivers, arrival)}"
+        manners = f"{_manners(drivers, own)}{_ability(drivers, arrival)}{_grip(scenario, arrival)}"
         types[name] = f'  <vType id="{name}" {size} {manners}{_class(scenario, arrival)}/>'
         vehicles.append(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
@@ -147,9 +152,22 @@ def _automated_type(scenario: Scenario, arrival: Arrival, automated: Automated) 
         f'  <vType id="{name}" length="{arrival.length_m!r}" maxSpeed="{top_mps!r}" '
         f'speedFactor="1" speedDev="0" {automated.model} tau="{automated.tau_s!r}" '
         f'minGap="{automated.min_gap_m!r}" {automated.manners}'
-        f"{_class(scenario, arrival)}/>"
+        f"{_grip(scenario, arrival)}{_class(scenario, arrival)}/>"
     )
     return name, line
+
+
+def _grip(scenario: Scenario, arrival: Arrival) -> str:
+    """Returns how hard it brakes, comfortably and at most, where the road's adhesion says so."""
+    most_mps2 = scenario.road.most_braking_mps2
+    if math.isinf(most_mps2):
+        return ""
+    kind = scenario.type_named(arrival.vehicle_type).sumo_class
+    comfort_mps2, hardest_mps2 = SUMO_BRAKING_MPS2.get(kind, HEAVY_BRAKING_MPS2)
+    return (
+        f' decel="{min(comfort_mps2, most_mps2)!r}"'
+        f' emergencyDecel="{min(hardest_mps2, most_mps2)!r}"'
+    )
 
 
 def _top_mps(arrival: Arrival) -> float:

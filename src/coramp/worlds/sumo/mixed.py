@@ -54,7 +54,8 @@ def run_mixed(
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic=False, sampled=True)
         traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
-        types = automated_types(scenario, automated, law)
+        actuators = actuators_of(scenario, len(arrivals))
+        types = automated_types(scenario, automated, law, actuators.delay_s)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
         with Session(files.options(), step_s, options.gui) as session:
             plant = MixedPlant(
@@ -64,7 +65,7 @@ def run_mixed(
                 period_steps,
                 step_s,
                 types.min_gap_m,
-                actuators_of(scenario, len(arrivals)),
+                actuators,
             )
             heard = automated | connected_of(scenario, arrivals, seed)
             speeds = scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps
@@ -109,14 +110,18 @@ class Control:
             now_s = step * plant.step_s
             careless.act_among(now_s, names, users)
             if users.automated.any():
-                accel_mps2, changes = self.commands(now_s, plant, on_lane, users)
-                accel_mps2 = careless.with_breakdown(now_s, users.number, accel_mps2)
+                able = on_lane & ~careless.broken_down(now_s, users.number)
+                accel_mps2, changes = self.commands(now_s, plant, able, users)
+                accel_mps2 = careless.with_breakdown(now_s, users, accel_mps2)
                 plant.command(names, users, accel_mps2, changes)
 
     def commands(
         self, now_s: float, plant: MixedPlant, on_lane: BoolArray, users: RoadUsers
     ) -> tuple[FloatArray, BoolArray]:
-        """Returns the acceleration (m/s2) of each vehicle and who changes lanes."""
+        """Returns the acceleration (m/s2) of each vehicle and who changes lanes.
+
+        Only who is ``on_lane``, the acceleration lane, and able to may do that.
+        """
         most_mps2, may_merge = self._told(now_s, plant.period_s, users)
         around, ahead = neighbours_of(users), plant.ahead(users)
         wishes = may_merge & on_lane & users.automated

@@ -7,7 +7,6 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
-from coramp.equations.conflict_risk import GRAVITY_MPS2
 from coramp.mixed.laws import SafetyLaw
 from coramp.mixed.users import Gaps
 from coramp.scenarios.model import Scenario
@@ -50,7 +49,7 @@ def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     They react no sooner than at their next command. Drivers move in Euler steps, in which one
     that brakes from v comes to a stand v h / 2 earlier than by v^2 / (2 b).
     """
-    law = SafetyLaw()
+    law = SafetyLaw().on(scenario.road.assumed_braking_mps2)
     shorter_m = 0.5 * scenario.mainline.limit_mps * scenario.control.step_s
     end_m = scenario.ramp.acceleration_lane_m - LANE_END_M
     return law._replace(
@@ -60,11 +59,16 @@ def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     )
 
 
-def automated_types(scenario: Scenario, automated: BoolArray, law: SafetyLaw) -> Automated:
-    """Returns how SUMO's drivers know automated vehicles: by the gaps that these keep at least."""
+def automated_types(
+    scenario: Scenario, automated: BoolArray, law: SafetyLaw, delay_s: float
+) -> Automated:
+    """Returns how SUMO's drivers know automated vehicles: by the gaps that these keep at least.
+
+    ``delay_s`` is the time until a command acts. SUMO lets a vehicle enter at such gaps, too.
+    """
     return Automated(
         automated,
-        max(scenario.safety.time_gap_s, law.reaction_s),
+        max(scenario.safety.time_gap_s, law.reaction_s + delay_s),
         max(scenario.safety.standstill_gap_m, law.margin_m),
         YIELDED_TO,
     )
@@ -87,7 +91,7 @@ class Able:
         """Returns what the vehicles of these arrivals can do; the law's braking is the most."""
         usual = scenario.usual_traits(0.0)
         traits: list[Traits] = [a.traits or usual for a in arrivals]
-        most_mps2 = SafetyLaw().braking_mps2
+        most_mps2 = SafetyLaw().on(scenario.road.assumed_braking_mps2).braking_mps2
         brakes = [
             most_mps2 if np.isinf(t.braking_mps2) else max(t.braking_mps2, TRUCK_BRAKING_MPS2)
             for t in traits
@@ -105,6 +109,5 @@ class Able:
 
 def actuators_of(scenario: Scenario, vehicles: int) -> SlowActuators:
     """Returns how automated vehicles follow accelerations on this road."""
-    adhesion = scenario.road.adhesion
-    most_mps2 = np.inf if adhesion is None else adhesion * GRAVITY_MPS2
-    return SlowActuators(scenario.actuators, vehicles, scenario.control.step_s, most_mps2)
+    step_s, most_mps2 = scenario.control.step_s, scenario.road.most_braking_mps2
+    return SlowActuators(scenario.actuators, vehicles, step_s, most_mps2)

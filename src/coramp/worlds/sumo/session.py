@@ -122,9 +122,10 @@ class Session:
         libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
 
     def force(self, vehicle_id: str, speed_mps: float, time_s: float) -> None:
-        """Has a driver change to a speed, whatever is around him, until he is released."""
+        """Has a driver change to a speed in his lane, whatever is around him, until released."""
         _check_speed(vehicle_id, speed_mps)
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
         libsumo.vehicle.slowDown(vehicle_id, speed_mps, max(time_s, self._step_s))
 
     def hold(self, vehicle_id: str, speed_mps: float) -> None:
@@ -136,6 +137,7 @@ class Session:
         """Leaves a vehicle to its driver again; one that has left the road needs nothing."""
         if vehicle_id in libsumo.vehicle.getIDList():
             libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
+            libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
             libsumo.vehicle.setSpeed(vehicle_id, -1.0)
 
     def judge_gaps_by(self, vehicle_id: str, min_gap_m: float, assertive: float) -> None:

@@ -74,7 +74,7 @@ coramp.Replay = class {
     const { element } = coramp;
     this.playButton = element('button', { type: 'button', class: 'play', onclick: () => this.toggle() }, 'play');
     this.slider = element('input', {
-      type: 'range', min: 0, max: this.end, step: 0.1, 'aria-label': 'time in s',
+      type: 'range', min: 0, max: this.end, step: 0.1, 'aria-label': 'time in s', list: 'world-events',
       oninput: () => this.seek(Number(this.slider.value)),
     });
     this.clock = element('output', { class: 'clock' });
@@ -89,7 +89,21 @@ coramp.Replay = class {
       onclick: () => this.seek(this.time + by) }, text);
     this.bar = element('div', { class: 'bar', role: 'group', 'aria-label': 'play' },
       element('div', { class: 'buttons' }, this.playButton, step(-1, 'one second back', '−1 s'),
-        step(1, 'one second on', '+1 s'), this.speeds, this.clock), this.slider);
+        step(1, 'one second on', '+1 s'), this.speeds, this.clock), this.slider, ...this.happened());
+  }
+
+  // What happened by itself: ticks on the time axis, and buttons that go there.
+  happened() {
+    const { element } = coramp;
+    const events = this.runs.flatMap((run) => (run.events ?? []).map((event) => [run, event]));
+    if (!events.length) return [];
+    const seconds = (event) => `${event.time.toFixed(1)} s`;
+    const text = (run, event) => `${seconds(event)}: ${event.what} (${run.ids[event.vehicle]})`;
+    const button = ([run, event]) => element('button', { type: 'button',
+      onclick: () => this.seek(Math.max(0, event.time - 2)) }, text(run, event));
+    return [element('datalist', { id: 'world-events' },
+      ...events.map(([, event]) => element('option', { value: event.time, label: event.what }))),
+    element('div', { class: 'happened', role: 'group', 'aria-label': 'what happened by itself' }, ...events.map(button))];
   }
 
   panel(run) {

@@ -1,0 +1,26 @@
+"""What came of a world that fails, in a line."""
+
+from coramp.records.run import RunRecords
+
+HAPPENED = {
+    "vehicle breaks down": ("vehicle broke down", "vehicles broke down"),
+    "driver brakes for nothing": ("driver braked for nothing", "drivers braked for nothing"),
+}
+"""Events of the world itself, one and several of them."""
+
+
+def told_of_world(run: RunRecords) -> str:
+    """Returns messages lost, fallbacks and events of a run, nothing where there were none."""
+    row = run.summary
+    told = [
+        f"{row[f'{what}_lost']} of {row[f'{what}_sent']} {what} lost"
+        for what in ("reports", "commands")
+        if row.get(f"{what}_lost")
+    ]
+    if fallbacks := row.get("fallbacks"):
+        told.append(f"{fallbacks} fallback{'s' if fallbacks > 1 else ''} on board")
+    events = [] if run.safety_events is None else run.safety_events["event"].to_list()
+    for event, (one, several) in HAPPENED.items():
+        if count := events.count(event):
+            told.append(f"{count} {one if count == 1 else several}")
+    return ", ".join(told)
