@@ -24,9 +24,9 @@ DRAC_MPS2 = {"conflicts_drac_2": 2.0, "conflicts_drac_3_4": 3.4, "conflicts_drac
 PET_S = {"conflicts_pet_1": 1.0, "conflicts_pet_0_5": 0.5, "conflicts_pet_0_2": 0.2}
 """Neighbours at a lane change that come below a PET."""
 SEVERITY = {
-    "conflicts_severity_1": SEVERITY_THRESHOLD_M2PS4,
-    "conflicts_severity_10": 10.0 * SEVERITY_THRESHOLD_M2PS4,
-    "conflicts_severity_100": 100.0 * SEVERITY_THRESHOLD_M2PS4,
+    "conflicts_j_1": SEVERITY_THRESHOLD_M2PS4,
+    "conflicts_j_10": 10.0 * SEVERITY_THRESHOLD_M2PS4,
+    "conflicts_j_100": 100.0 * SEVERITY_THRESHOLD_M2PS4,
 }
 """Neighbours at a lane change that come above J: multiples of (0.3 g)^2."""
 
@@ -76,7 +76,8 @@ def _closing(seen: Seen, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
     ttc_s = np.where(touch, 0.0, safe_m / safe_mps)
     drac_mps2 = np.where(touch, np.inf, 0.5 * safe_mps**2 / safe_m)
     count = len(seen.length_m)
-    who = seen.vehicle[pairs.rear[near]] * count + seen.vehicle[pairs.front[near]]
+    rear, front = seen.vehicle[pairs.rear[near]], seen.vehicle[pairs.front[near]]
+    who = np.minimum(rear, front) * count + np.maximum(rear, front)  # a simulator lets them swap
     pair, place = np.unique(who, return_inverse=True)
     least_s, most_mps2 = np.full(len(pair), np.inf), np.zeros(len(pair))
     np.minimum.at(least_s, place, ttc_s)

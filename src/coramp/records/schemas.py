@@ -218,9 +218,9 @@ MIXED_METRICS: Schema = {
     "conflicts_pet_1": pl.Int64,
     "conflicts_pet_0_5": pl.Int64,
     "conflicts_pet_0_2": pl.Int64,
-    "conflicts_severity_1": pl.Int64,
-    "conflicts_severity_10": pl.Int64,
-    "conflicts_severity_100": pl.Int64,
+    "conflicts_j_1": pl.Int64,
+    "conflicts_j_10": pl.Int64,
+    "conflicts_j_100": pl.Int64,
 }
 """Figures of automated vehicles among drivers, null in other runs but for the distance.
 

@@ -52,9 +52,9 @@ CONFLICT_COLUMNS = {
     "conflicts_pet_1": "PET < 1 s",
     "conflicts_pet_0_5": "PET < 0.5 s",
     "conflicts_pet_0_2": "PET < 0.2 s",
-    "conflicts_severity_1": "J > 1",
-    "conflicts_severity_10": "J > 10",
-    "conflicts_severity_100": "J > 100",
+    "conflicts_j_1": "J > 1",
+    "conflicts_j_10": "J > 10",
+    "conflicts_j_100": "J > 100",
 }
 Rows = tuple[tuple[str, ...], ...]
 
