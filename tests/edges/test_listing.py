@@ -32,6 +32,7 @@ def test_what_the_design_promises_is_built_in():
         "worth",
         "motorway",
         "penetration",
+        "hostile",
     } <= set(builtin_names("studies"))
     assert "example" in builtin_names("snapshots")
     assert list(strategies()) == [

@@ -203,4 +203,7 @@ def test_runs_that_failed_are_told(studies, tmp_path, monkeypatch):
         ALL_LEFT_OUT,
     )
     with_capacity = save_figures(tmp_path, {**stored, "capacity": stored["sensitivity"]}, [])
-    assert with_capacity.notes == (drawn.notes[0], LEFT_OUT.format("field, baseline, penetration"))
+    assert with_capacity.notes == (
+        drawn.notes[0],
+        LEFT_OUT.format("field, baseline, penetration, hostile"),
+    )

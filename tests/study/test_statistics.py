@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from coramp.studies.statistics import Estimate, estimate, improvement_rate, ratio_of_sums
+from coramp.studies.statistics import (
+    Estimate,
+    estimate,
+    improvement_rate,
+    rate_interval,
+    ratio_of_sums,
+)
 from coramp.studies.summary import (
     largest,
     overview,
@@ -205,3 +211,16 @@ def test_what_is_in_proportion_has_a_ratio_without_doubt(numbers):
 def test_there_is_no_ratio_over_nothing():
     assert math.isnan(ratio_of_sums([1.0, 2.0], [0.0, 0.0]).mean)
     assert math.isnan(ratio_of_sums([], []).mean)
+
+
+def test_a_rate_has_the_exact_interval_of_a_poisson_count():
+    # Garwood (1936): 1 in 2 units
+    assert rate_interval(1, 2.0) == pytest.approx((0.02532 / 2.0, 5.5716 / 2.0), rel=1e-3)
+    assert rate_interval(10, 1.0) == pytest.approx((4.7954, 18.3904), rel=1e-4)
+
+
+def test_where_nothing_was_counted_the_limit_is_the_rule_of_three():
+    low, high = rate_interval(0, 1000.0)
+    assert low == 0.0
+    assert high == pytest.approx(3.0 / 1000.0, rel=2e-3)
+    assert all(math.isnan(limit) for limit in rate_interval(0, 0.0))

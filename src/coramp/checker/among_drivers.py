@@ -84,7 +84,7 @@ class Findings:
     unkept: tuple[tuple[float, int, int], ...]
 
 
-class _Pairs(NamedTuple):
+class Pairs(NamedTuple):
     """Neighbours in a lane at each step: rows of ``Seen``, and the gap between bumpers (m)."""
 
     rear: IntArray
@@ -96,7 +96,7 @@ def findings_of(
     seen: Seen, limits: Limits, reported: Sequence[tuple[float, int, int]] = ()
 ) -> Findings:
     """Returns what positions tell; ``reported`` are a simulator's collisions: time, rear, front."""
-    pairs = _pairs_of(seen)
+    pairs = pairs_of(seen)
     came_in, braking_mps2 = _came_in(seen), _braking_mps2(seen)
     rear, front = seen.vehicle[pairs.rear], seen.vehicle[pairs.front]
     time_s = seen.time_s[pairs.rear]
@@ -124,14 +124,15 @@ def findings_of(
     return Findings(collisions, tuple(_once(broken)), tuple(unkept))
 
 
-def _pairs_of(seen: Seen) -> _Pairs:
+def pairs_of(seen: Seen) -> Pairs:
+    """Returns all pairs of neighbours in a lane, step by step."""
     order = np.lexsort((-seen.station_m, seen.on_mainline, seen.time_s))
     front, rear = order[:-1], order[1:]
     together = seen.time_s[front] == seen.time_s[rear]
     together &= seen.on_mainline[front] == seen.on_mainline[rear]
     front, rear = front[together], rear[together]
     tail_m = seen.station_m[front] - seen.length_m[seen.vehicle[front]]
-    return _Pairs(rear, front, tail_m - seen.station_m[rear])
+    return Pairs(rear, front, tail_m - seen.station_m[rear])
 
 
 def _came_in(seen: Seen) -> BoolArray:
@@ -149,13 +150,13 @@ def _braking_mps2(seen: Seen) -> FloatArray:
     return np.append(0.0, -np.diff(seen.speed_mps) / step_s)[: len(seen.vehicle)]
 
 
-def _spare_m(seen: Seen, pairs: _Pairs, limits: Limits) -> FloatArray:
+def _spare_m(seen: Seen, pairs: Pairs, limits: Limits) -> FloatArray:
     """``gap + v_l^2 / (2 b) - v^2 / (2 b)`` of each pair."""
     leader, own = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
     return np.asarray(pairs.gap_m + (leader**2 - own**2) / (2.0 * limits.braking_mps2))
 
 
-def _pushed_in(seen: Seen, pairs: _Pairs, came_in: BoolArray, limits: Limits) -> BoolArray:
+def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> BoolArray:
     """Where an automated vehicle has come in before a driver, nearer than he brakes for in comfort.
 
     He has driven on for a step, and he may have sped up in it.

@@ -13,14 +13,17 @@ from coramp.checker.among_drivers import (
     Seen,
     findings_of,
 )
+from coramp.metrics.conflicts import conflicts_of
 from coramp.metrics.frames import frame_of
 from coramp.metrics.motion import distance_of_each_m, hard_brakings, stopped_vehicles
+from coramp.metrics.types import traits_of
 from coramp.mixed.laws import SafetyLaw
 from coramp.records.outcome import Outcome, Pieces
 from coramp.records.schemas import MIXED_METRICS, SAFETY_EVENTS, Row
 from coramp.road.lanes import MAINLINE
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
+from coramp.vehicles.traits import MASS
 
 HARD_MPS2 = 3.0
 NOBODY = -1
@@ -29,13 +32,23 @@ NEARER = "automated nearer than promised"
 
 
 def mixed_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> Row:
-    """Returns the figures by kind of vehicle, and whose fault collisions were; else null."""
+    """Returns the figures by kind of vehicle, and whose fault collisions were; else null.
+
+    Runs of drivers alone have the distance that was driven, and conflicts where the world is not
+    perfect.
+    """
     automated = outcome.passages.automated
+    figures: Row = dict.fromkeys(MIXED_METRICS)
+    if outcome.drivers:
+        figures["vehicle_km"] = float(distance_of_each_m(*_driven(outcome)).sum()) / 1000.0
+    if automated is not None or scenario.has_faults:
+        figures.update(_conflicts(outcome, scenario))
     if automated is None:
-        return dict.fromkeys(MIXED_METRICS)
+        return figures
     found = findings_in(outcome, scenario)
     causes = [collision.cause for collision in found.collisions]
     return {
+        **figures,
         "automated_vehicles": int(automated.sum()),
         "automated_delay_s": _mean(delay_s[automated]),
         "driver_delay_s": _mean(delay_s[~automated]),
@@ -48,30 +61,35 @@ def mixed_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> 
         "broken_assumptions": len(found.broken),
         "automated_violations": len(found.unkept),
         **{name: outcome.messages_of_air.get(name) for name in MESSAGES_OF_AIR},
-        "vehicle_km": float(distance_of_each_m(*_driven(outcome)).sum()) / 1000.0,
     }
 
 
 def findings_in(outcome: Outcome, scenario: Scenario) -> Findings:
     """Returns what the checker finds in the positions of a run of mixed traffic."""
-    passages, driven = outcome.passages, outcome.driven
-    automated = passages.automated
+    automated = outcome.passages.automated
     if automated is None:
         return Findings((), (), ())
+    limits = limits_of(scenario, scenario.drivers[outcome.drivers])
+    return findings_of(_seen(outcome, automated), limits, outcome.collided)
+
+
+def _seen(outcome: Outcome, automated: BoolArray) -> Seen:
+    """Where the simulator had whom at each of its steps."""
+    passages, driven = outcome.passages, outcome.driven
     vehicle = np.repeat(np.arange(len(passages)), np.diff(driven.first))
     time_s, station_m, speed_mps, _ = driven.rows.T
-    seen = Seen(
-        vehicle,
-        time_s,
-        station_m,
-        speed_mps,
-        outcome.lane == MAINLINE,
-        passages.length_m,
-        automated,
-    )
-    return findings_of(
-        seen, limits_of(scenario, scenario.drivers[outcome.drivers]), outcome.collided
-    )
+    on_mainline = outcome.lane == MAINLINE
+    return Seen(vehicle, time_s, station_m, speed_mps, on_mainline, passages.length_m, automated)
+
+
+def _conflicts(outcome: Outcome, scenario: Scenario) -> Row:
+    """How many conflicts there were, by how grave they are; nobody needs to be automated."""
+    passages = outcome.passages
+    automated = passages.automated
+    if automated is None:
+        automated = np.zeros(len(passages), np.bool_)
+    mass_kg = traits_of(passages, scenario)[:, MASS]
+    return conflicts_of(_seen(outcome, automated), outcome.driven.first, mass_kg).counts()
 
 
 def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:

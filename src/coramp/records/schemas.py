@@ -209,8 +209,23 @@ MIXED_METRICS: Schema = {
     "commands_lost": pl.Int64,
     "fallbacks": pl.Int64,
     "vehicle_km": pl.Float64,
+    "conflicts_ttc_3": pl.Int64,
+    "conflicts_ttc_1_5": pl.Int64,
+    "conflicts_ttc_1": pl.Int64,
+    "conflicts_drac_2": pl.Int64,
+    "conflicts_drac_3_4": pl.Int64,
+    "conflicts_drac_6": pl.Int64,
+    "conflicts_pet_1": pl.Int64,
+    "conflicts_pet_0_5": pl.Int64,
+    "conflicts_pet_0_2": pl.Int64,
+    "conflicts_j_1": pl.Int64,
+    "conflicts_j_10": pl.Int64,
+    "conflicts_j_100": pl.Int64,
 }
-"""Figures of automated vehicles among drivers, null in other runs."""
+"""Figures of automated vehicles among drivers, null in other runs but for the distance.
+
+Conflicts are also of drivers alone where the world is not perfect.
+"""
 
 RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS, **MIXED_METRICS}
 

@@ -15,6 +15,7 @@ from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.formula_figures import collision_figure, fuel_figure
 from coramp.report.front_figure import front_figure
+from coramp.report.hostile_figure import hostile_figure
 from coramp.report.penetration_figure import penetration_figure
 from coramp.report.road_figure import road_figure
 from coramp.report.run_figures import margin_figure, speed_figure
@@ -33,6 +34,7 @@ LONG_STUDIES = {
     "field": {"field": field_figure, "field-front": front_figure},
     "baseline": {"baseline": baseline_figure},
     "penetration": {"penetration": penetration_figure},
+    "hostile": {"hostile": hostile_figure},
 }
 """Figures of studies that take some ten minutes; they are drawn where the study is given."""
 LEFT_OUT = (

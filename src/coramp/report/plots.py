@@ -182,6 +182,15 @@ class StudyPlots:
 
         return penetration_figure(self._drawn("penetration"))
 
+    def plot_hostile(self) -> "Figure":
+        """Returns delay (% of that in a perfect world) and conflicts by fault, share and demand.
+
+        Raises CorampError for a study whose layout is not ``hostile``, and where no run went well.
+        """
+        from coramp.report.hostile_figure import hostile_figure
+
+        return hostile_figure(self._drawn("hostile"))
+
     def _drawn(self, layout: str) -> pl.DataFrame:
         """The runs that went well, of a study that has this layout."""
         if self.layout != layout:

@@ -14,7 +14,7 @@ from coramp.records.stored_checks import checked_frame, first_of
 from coramp.studies.definition import Study
 from coramp.studies.store import MARK, Store
 
-DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline", "penetration")
+DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline", "penetration", "hostile")
 """The layouts of studies that there are figures of."""
 
 

@@ -126,6 +126,7 @@ class Study(Model):
         "drivers",
         "worth",
         "penetration",
+        "hostile",
     ] = "plain"
     horizon_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
     runs: Annotated[tuple[Grid, ...], Field(strict=False)] = ()

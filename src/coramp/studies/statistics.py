@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from scipy.special import stdtrit
+from scipy.special import gammaincinv, stdtrit
 
 CONFIDENCE = 0.95
 
@@ -52,3 +52,18 @@ def ratio_of_sums(values: Sequence[float], over: Sequence[float]) -> Estimate:
     ratio = math.fsum(values) / total
     left = estimate([x - ratio * y for x, y in zip(values, over, strict=True)])
     return Estimate(ratio, left.half_width * len(values) / total, len(values))
+
+
+def rate_interval(count: int, exposure: float) -> tuple[float, float]:
+    """Returns the exact 95 % interval of a rate by its Poisson count (Garwood).
+
+    Where nothing was counted it is 0 to the one-sided 95 % limit, -ln 0.05 / exposure, which is the
+    rule of three. Nan without exposure.
+    """
+    if exposure <= 0.0:
+        return math.nan, math.nan
+    if count == 0:
+        return 0.0, -math.log(1.0 - CONFIDENCE) / exposure
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low, high = gammaincinv(count, tail), gammaincinv(count + 1, 1.0 - tail)
+    return float(low) / exposure, float(high) / exposure

@@ -11,6 +11,7 @@ from coramp.studies.capacity_layout import capacity_tables
 from coramp.studies.definition import Study
 from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.field_layout import field_tables
+from coramp.studies.hostile_layout import hostile_tables
 from coramp.studies.metric_labels import LABELS, SPEED, label_of
 from coramp.studies.overrides import overrides_of
 from coramp.studies.paired import paired_table
@@ -31,6 +32,7 @@ LAYOUTS: dict[str, Callable[[pl.DataFrame], list[Table]]] = {
     "drivers": drivers_tables,
     "worth": worth_tables,
     "penetration": penetration_tables,
+    "hostile": hostile_tables,
 }
 MEANS = (
     *("delay_s", "delay_bound_s", "mainline_delay_s", "ramp_delay_s"),

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import polars as pl
 
 from coramp.report.style import look_of
+from coramp.studies.hostile_layout import collisions_table
+from coramp.studies.hostile_runs import DRIVERS_ALONE, cells_of
 from coramp.studies.overrides import overrides_of, scenario_value
 from coramp.studies.paired import Cell, Difference, differences
 from coramp.studies.penetration_layout import pays_table, series_of
@@ -146,6 +148,22 @@ def penetration_answer(good: pl.DataFrame) -> Answer | None:
     more = len(items) - MOST_SHARES
     rest = f"{more} more lines are in the tables." if more > 0 else ""
     return Answer(lead, items[:MOST_SHARES], rest)
+
+
+def hostile_answer(good: pl.DataFrame) -> Answer | None:
+    """Returns the collisions by cause in each world, None where there is nobody automated."""
+    cells = [cell for cell in cells_of(good) if cell.line.who != DRIVERS_ALONE]
+    if not cells:
+        return None
+    table = collisions_table(cells)
+    items = tuple(
+        (
+            fault,
+            f"{own} by automated vehicles, {driver} by drivers, {among} among drivers; {km} km",
+        )
+        for fault, _, _, _, _, km, own, driver, among, *_ in table.rows
+    )
+    return Answer("Collisions, in brackets a million vehicle km with the 95 % interval:", items)
 
 
 def _from(share: str) -> str:

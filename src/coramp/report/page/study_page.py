@@ -14,12 +14,14 @@ from coramp.report.capacity_figure import capacity_figure
 from coramp.report.field_figure import field_figure
 from coramp.report.flow_figures import delay_figure, gain_figure, rung_figure
 from coramp.report.front_figure import front_figure
+from coramp.report.hostile_figure import hostile_figure
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
 from coramp.report.page.study_answer import (
     Answer,
+    hostile_answer,
     layout_answer,
     own_answer,
     penetration_answer,
@@ -57,6 +59,7 @@ DRAWN = {
     ),
     "baseline": (("What a gain owes to its baseline, and to short gaps", baseline_figure),),
     "penetration": (("Delay and hard braking by share of automated vehicles", penetration_figure),),
+    "hostile": (("Delay and conflicts by fault and share of automated vehicles", hostile_figure),),
 }
 MOST_VALUES = 6
 """Of a setting with more values the first and the last are told."""
@@ -105,7 +108,8 @@ def _answer(study: Study, good: pl.DataFrame, scenario: Row) -> Answer:
     """What the study says first."""
     if study.layout == "plain":
         return own_answer(good, scenario)
-    found = penetration_answer(good) if study.layout == "penetration" else None
+    own = {"penetration": penetration_answer, "hostile": hostile_answer}.get(study.layout)
+    found = own(good) if own is not None else None
     return found or layout_answer(good)
 
 
