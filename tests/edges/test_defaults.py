@@ -126,7 +126,10 @@ def test_a_speed_that_is_missing_is_one_error(bare):
     told = invoke("run", bare({"speed_kmh = 65\n": ""}))
     assert_refused(told)
     (line,) = told.errors
-    assert line.endswith("bare.toml: ramp.speed_mps: is missing; it must be given")
+    assert line.endswith(
+        "bare.toml: ramp.speed_mps: is missing; give ramp.speed_kmh or "
+        "ramp.speed_mps, the speed at which vehicles drive; the limit follows from it"
+    )
 
 
 def test_populations_that_every_scenario_has_can_be_set(bare):
