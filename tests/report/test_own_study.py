@@ -60,8 +60,8 @@ def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
     assert re.search(r"horizon of a run \(s\)</td><td[^>]*>60</td>", text)
     assert captions(text) == [
         "Mean delay over what varies, with 95 % intervals over seeds",
-        f"Mean speed over time {at}",
-        f"Mean delay over time {at}",
+        f"Mean speed over time {at}, the first of 2 settings",
+        f"Mean delay over time {at}, the first of 2 settings",
     ]
     assert f"and the replay, are of {at.removeprefix('at ')}, the first of 2 settings." in text
     another = re.search(r"<pre[^>]*><code># another: (.*?)</code>", text, re.DOTALL).group(1)
@@ -102,7 +102,7 @@ def test_every_row_tells_the_value_of_what_varies_and_the_answers_names(tmp_path
     cells = re.findall(r"<td[^>]*>((?:mainline|slots|no control).*?)</td>", pairs)
     assert cells
     assert all(cell.endswith(gaps) for cell in cells)
-    assert "no gaps beyond Eq. 1, seed 1" in captions(text)[1]
+    assert "no gaps beyond Eq. 1, seed 1, the first of 2 settings" in captions(text)[1]
 
 
 def test_what_columns_mean_and_how_sure_differences_are_is_said(folder):

@@ -26,13 +26,17 @@ def setting_of_run(run: RunRecords, keys: Sequence[str] = ()) -> str:
 
 
 def over_time_pictures(
-    runs: Sequence[RunRecords], unit: SpeedUnit = MPS, keys: Sequence[str] = ()
+    runs: Sequence[RunRecords],
+    unit: SpeedUnit = MPS,
+    keys: Sequence[str] = (),
+    place: str = "",
 ) -> list[Row]:
     """Returns speed and delay over time of runs on the same arrivals, as parts of a page.
 
-    ``keys`` are the settings that captions tell in any case.
+    ``keys`` are the settings that captions tell in any case, ``place`` which of a study's settings
+    these are.
     """
-    at = f" at {setting_of_run(runs[0], keys)}"
+    at = f" at {', '.join(part for part in (setting_of_run(runs[0], keys), place) if part)}"
     return [
         picture(f"Mean speed over time{at}", speeds_over_time_figure(runs, unit)),
         picture(f"Mean delay over time{at}", delays_over_time_figure(runs)),

@@ -27,7 +27,12 @@ from coramp.report.page.study_answer import (
 )
 from coramp.report.page.study_columns import meanings_of
 from coramp.report.page.study_names import named_as_answered, names_with_options
-from coramp.report.page.study_repeat import another_setting, repeat_command, watched_text
+from coramp.report.page.study_repeat import (
+    another_setting,
+    place_among,
+    repeat_command,
+    watched_text,
+)
 from coramp.report.page.svg import picture
 from coramp.report.penetration_figure import penetration_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
@@ -90,7 +95,11 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         without_same(named_as_answered(table, good))
         for table in summary_tables(study, every, unit, scenario)
     ]
-    over_time = [row for runs in by_flow.values() for row in over_time_pictures(runs, unit, keys)]
+    over_time = [
+        row
+        for runs in by_flow.values()
+        for row in over_time_pictures(runs, unit, keys, place_among(good, runs))
+    ]
     return assembled(
         "study.html",
         title=f"Report: study {study.name}",

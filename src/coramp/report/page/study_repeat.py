@@ -59,19 +59,23 @@ def watched_text(by_flow: Mapping[str, Sequence[RunRecords]], good: pl.DataFrame
     shown = [setting_of_run(runs[0], keys) for runs in by_flow.values()]
     if not shown:
         return ""
-    settings = good["overrides"].unique(maintain_order=True).to_list()
-    others = f", {_place_among(settings, good, by_flow)}" if len(settings) > 1 else ""
+    found = place_among(good, [run for runs in by_flow.values() for run in runs])
+    others = f", {found}" if found else ""
     return (
         f"The curves of speed and delay over time, and the replay, are of {'; and of '.join(shown)}"
         f"{others}."
     )
 
 
-def _place_among(
-    settings: Sequence[str | None], good: pl.DataFrame, by_flow: Mapping[str, Sequence[RunRecords]]
-) -> str:
-    """Which of the study's settings is shown: the first, the last or another of so many."""
-    ids = {run.content["run_id"] for runs in by_flow.values() for run in runs}
+def place_among(good: pl.DataFrame, runs: Sequence[RunRecords]) -> str:
+    """Returns which of a study's settings runs have: ``the first of 2 settings``.
+
+    Empty where there is one only.
+    """
+    settings = good["overrides"].unique(maintain_order=True).to_list()
+    if len(settings) < 2:
+        return ""
+    ids = {run.content["run_id"] for run in runs}
     shown = good.filter(pl.col("run_id").is_in(ids))["overrides"].unique().to_list()
     place = settings.index(shown[0]) if len(shown) == 1 else -1
     which = {0: "the first", len(settings) - 1: "the last"}.get(place, "one")
