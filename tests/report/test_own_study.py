@@ -15,8 +15,8 @@ from coramp.report.over_time_figure import (
     speeds_over_time_figure,
 )
 from coramp.report.page.study_answer import own_answer
-from coramp.report.page.study_page import _of_differences
 from coramp.report.page.study_repeat import repeat_command
+from coramp.report.page.study_sure import of_differences, of_little
 from coramp.report.varied_figure import varied
 from coramp.report.writing import report
 from coramp.scenarios.toml_files import builtin_text
@@ -113,7 +113,7 @@ def test_what_columns_mean_and_how_sure_differences_are_is_said(folder):
     assert set(re.findall(r"<dt>(.*?)</dt>", fold)) == set(heads)
     sure = text.split("<h2>How sure</h2>")[1].split("<h2>")[0]
     assert "seed by seed on the same arrivals, so they are surer than the means" in sure
-    assert "from 2 seeds and 60 s of arrivals a run: little." in sure
+    assert "There are 2 seeds and 60 s of arrivals a run, which is little" in sure
 
 
 def test_how_sure_counts_differences_that_may_be_chance():
@@ -121,11 +121,20 @@ def test_how_sure_counts_differences_that_may_be_chance():
         return [run_row(strategy, seed=s, delay_s=d) for s, d in enumerate(by_seed, 1)]
 
     slots = delays("slots", (1.0, 5.0, 9.0))
-    sure, short = _of_differences(runs_of(*slots, *delays("game", (1.5, 5.7, 9.6))), 60.0)
+    (sure,) = of_differences(runs_of(*slots, *delays("game", (1.5, 5.7, 9.6))))
     assert sure.endswith("The intervals of all differences in the answer exclude zero.")
-    assert "3 seeds and 60 s" in short
-    unsure, _ = _of_differences(runs_of(*slots, *delays("game", (1.5, 4.7, 9.6))), 3600.0)
+    (unsure,) = of_differences(runs_of(*slots, *delays("game", (1.5, 4.7, 9.6))))
     assert "The intervals of 1 of the 1 differences in the answer hold zero" in unsure
+    assert list(of_differences(runs_of(*slots))) == []
+
+
+@pytest.mark.parametrize(
+    ("seeds", "horizon_s", "told"),
+    [(3, 60.0, "3 seeds and 60 s"), (1, 60.0, "60 s"), (3, 3600.0, "3 seeds"), (10, 1800.0, None)],
+)
+def test_few_seeds_and_a_short_horizon_are_told(seeds, horizon_s, told):
+    lines = list(of_little(seeds, horizon_s))
+    assert [line.startswith(f"There are {told}") for line in lines] == ([True] if told else [])
 
 
 def test_the_note_on_the_bound_stands_only_beside_it():

@@ -20,7 +20,6 @@ from coramp.report.page.pages import check_same_arrivals
 from coramp.report.page.shown import title_of
 from coramp.report.page.study_answer import (
     Answer,
-    answered_differences,
     layout_answer,
     own_answer,
     penetration_answer,
@@ -33,6 +32,7 @@ from coramp.report.page.study_repeat import (
     repeat_command,
     watched_text,
 )
+from coramp.report.page.study_sure import how_sure
 from coramp.report.page.svg import picture
 from coramp.report.penetration_figure import penetration_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
@@ -48,7 +48,7 @@ from coramp.studies.shown import (
     shown_rows,
 )
 from coramp.studies.speed_unit import MPS, SpeedUnit
-from coramp.studies.summary import promises, summary_tables
+from coramp.studies.summary import summary_tables
 from coramp.studies.tables import Table, without_same
 
 DRAWN = {
@@ -68,9 +68,6 @@ DRAWN = {
 }
 MOST_VALUES = 6
 """Of a setting with more values the first and the last are told."""
-FEW_SEEDS = 10
-SHORT_S = 1800.0
-"""Fewer seeds, or a shorter horizon (s), are told."""
 OWN = "Mean delay over what varies, with 95 % intervals over seeds"
 """The figure of a study whose layout has none of its own."""
 
@@ -111,7 +108,12 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         meanings=meanings_of(tables),
         pictures=[*pictures_of(study.layout, good, content["scenario"]), *over_time],
         failed=_failed(every),
-        sure=_how_sure(good, _horizon_s(study, scenario), listed=_lists_arrivals(content)),
+        sure=how_sure(
+            good,
+            _horizon_s(study, scenario),
+            compared=study.layout == "plain",
+            listed=_lists_arrivals(content),
+        ),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
         repeat=repeat_command(study, files, good["seed"].n_unique()),
         files=files,
@@ -226,54 +228,6 @@ def _cell(value: object) -> str:
     if value is None:
         return "-"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _of_differences(good: pl.DataFrame, horizon_s: float) -> Iterator[str]:
-    """How sure differences are, and what few seeds and a short horizon leave open."""
-    found = answered_differences(good)
-    if found:
-        unsure = sum(not difference.told_apart for difference in found)
-        sure = (
-            "The intervals of all differences in the answer exclude zero."
-            if not unsure
-            else f"The intervals of {unsure} of the {len(found)} differences in the answer hold "
-            "zero: these may be chance."
-        )
-        yield (
-            "Differences are taken seed by seed on the same arrivals, so they are surer than the "
-            f"means, whose intervals may overlap. {sure}"
-        )
-    seeds = good["seed"].n_unique()
-    few = [f"{seeds} seeds"] if 1 < seeds < FEW_SEEDS else []
-    short = [f"{horizon_s:g} s of arrivals"] if horizon_s < SHORT_S else []
-    if few or short:
-        yield (
-            f"This is from {' and '.join(few + short)} a run: little. For a claim take at least "
-            f"{FEW_SEEDS} seeds and {SHORT_S:g} s; queues that grow slowly show only then."
-        )
-
-
-def _how_sure(good: pl.DataFrame, horizon_s: float, *, listed: bool) -> list[str]:
-    kept = promises(good)
-    seeds = good["seed"].n_unique()
-    alone = " One seed has none; run more (--seeds 10)." if seeds == 1 else ""
-    if listed:
-        means = (
-            "Arrivals are listed: a seed changes drivers alone, and a cooperative run is the same "
-            "with every seed. It runs once, so that it has no interval."
-        )
-    else:
-        means = (
-            f"Means are over {seeds} seeds, each one draw of arrivals and entry speeds, the same "
-            f"for every strategy; ± is a 95 % interval of the mean by Student's t.{alone}"
-        )
-    return [
-        means,
-        *_of_differences(good, horizon_s),
-        "What the cooperative runs promised: "
-        + "; ".join(f"{what}: {value}" for what, value in kept.rows)
-        + ".",
-    ]
 
 
 def pictures_of(
