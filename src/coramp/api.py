@@ -22,6 +22,7 @@ from coramp.runs.beforehand import (
 from coramp.runs.mixed import check_messages_kept
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
+from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.snapshots import load_snapshot
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
@@ -176,7 +177,8 @@ def study(
         searched = run_searches(store, searches, jobs, report)
     everything = {spec.run_id: spec for spec in (*specs, *searched)}
     runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
-    tables = summary_tables(definition, runs, KMH if kmh else MPS)
+    scenario = load_scenario(definition.source).model_dump(mode="json")
+    tables = summary_tables(definition, runs, KMH if kmh else MPS, scenario)
     keep_shown(store.folder, definition, runs.filter(status="ok"), notice or (lambda _: None))
     store.write_tables(runs, streams, to_markdown(definition, tables))
     if definition.layout == "capacity":
@@ -239,11 +241,11 @@ def load(folder: str | Path) -> RunResult | StudyResult:
     """
     place = Path(folder)
     if (place / STUDY_MARK).exists():
-        from coramp.report.study_folder import stored_runs, stored_streams
+        from coramp.report.study_folder import scenario_of, stored_runs, stored_streams
 
         definition, runs = stored_runs(place)
         streams = stored_streams(place, definition)
-        tables = tuple(summary_tables(definition, runs))
+        tables = tuple(summary_tables(definition, runs, scenario=scenario_of(place)))
         return StudyResult(place, runs, streams, tables, definition.layout)
     if not (place / RUN_MARK).exists():
         raise CorampError(

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp import CorampError
+from coramp.runs.beforehand import without_effect_on_drivers
 from coramp.runs.running import make_spec
 from coramp.scenarios.checks import decision_station_range_m
 from coramp.scenarios.loading import load_scenario
@@ -126,7 +127,10 @@ def test_a_speed_that_is_missing_is_one_error(bare):
     told = invoke("run", bare({"speed_kmh = 65\n": ""}))
     assert_refused(told)
     (line,) = told.errors
-    assert line.endswith("bare.toml: ramp.speed_mps: is missing; it must be given")
+    assert line.endswith(
+        "bare.toml: ramp.speed_mps: is missing; give ramp.speed_kmh or "
+        "ramp.speed_mps, the speed at which vehicles drive; the limit follows from it"
+    )
 
 
 def test_populations_that_every_scenario_has_can_be_set(bare):
@@ -146,6 +150,19 @@ def test_gaps_of_coordinated_vehicles_are_said_to_bind_no_drivers(bare):
             "drivers.fair.tau_s and drivers.fair.min_gap_m instead"
         )
     ]
+
+
+def test_a_note_says_how_to_vary_drivers_along_and_is_left_out_where_that_is_done(bare):
+    def specs(*settings):
+        return [make_spec(bare(), "uncontrolled", overrides=given) for given in settings]
+
+    gap, tau_s = "safety.time_gap_s", "drivers.fair.tau_s"
+    alone = without_effect_on_drivers(specs({gap: 1.4}, {gap: 0.6}))
+    assert alone.endswith("to vary both, set both in one [[runs]] block for each value")
+    along = specs({gap: 1.4, tau_s: 1.4}, {gap: 0.6, tau_s: 0.6})
+    assert without_effect_on_drivers(along) is None
+    crossed = specs(*({gap: a, tau_s: b} for a in (0.6, 1.4) for b in (0.6, 1.4)))
+    assert without_effect_on_drivers(crossed) is not None
 
 
 def test_settings_may_be_in_kmh_and_take_the_place_of_the_files(bare):

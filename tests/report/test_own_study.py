@@ -16,11 +16,13 @@ from coramp.report.over_time_figure import (
 )
 from coramp.report.page.study_answer import own_answer
 from coramp.report.page.study_repeat import repeat_command
+from coramp.report.page.study_sure import of_differences, of_little
 from coramp.report.varied_figure import varied
 from coramp.report.writing import report
 from coramp.scenarios.toml_files import builtin_text
 from coramp.studies.definition import Study, load_study
 from coramp.studies.speed_unit import KMH
+from coramp.studies.summary import overview
 from coramp.studies.tables import Table, without_same
 from tests.edges import invoke
 from tests.report.browser import chromium, in_browser, opened
@@ -58,15 +60,18 @@ def test_a_first_report_has_its_pictures_and_runs_to_watch(folder):
     assert re.search(r"horizon of a run \(s\)</td><td[^>]*>60</td>", text)
     assert captions(text) == [
         "Mean delay over what varies, with 95 % intervals over seeds",
-        f"Mean speed over time {at}",
-        f"Mean delay over time {at}",
+        f"Mean speed over time {at}, the first of 2 settings",
+        f"Mean delay over time {at}, the first of 2 settings",
     ]
-    assert f"and the replay, are of {at.removeprefix('at ')}, one of 2 settings." in text
+    assert f"and the replay, are of {at.removeprefix('at ')}, the first of 2 settings." in text
     another = re.search(r"<pre[^>]*><code># another: (.*?)</code>", text, re.DOTALL).group(1)
     assert another.splitlines()[0] == "time gap 1.0 s, seed 1"
-    assert another.count("coramp run paper --strategy") == 2
+    assert another.count("coramp run paper --strategy") == 3
+    assert another.count("--drivers fair") == 1
     assert "--set safety.time_gap_s=1.0 --out out/b" in another
-    assert another.splitlines()[-1] == "coramp report out/a --against out/b"
+    assert another.splitlines()[-2:] == [
+        f"coramp report out/a --against out/{other}" for other in "bc"
+    ]
     assert re.findall(r'id="run-\d"', text) == ['id="run-0"', 'id="run-1"', 'id="run-2"']
     assert "has kept no runs to watch" not in text
     assert "<summary>Differences on the same arrivals</summary>" in text
@@ -79,6 +84,96 @@ def test_the_answer_tells_each_setting_apart(folder):
     assert answer.count("no control, fair drivers (who keep 1.0 s + 2.5 m)") == 2
     assert len(re.findall(r"is best by \d+\.\d\d ± \d+\.\d\d s over", answer)) == 2
     assert "time_gap_s" not in answer
+
+
+def test_every_row_tells_the_value_of_what_varies_and_the_answers_names(tmp_path):
+    blocks = STUDY.replace("[0.6, 1.0]", "[0.0, 1.0]").replace("60.0", "30.0")
+    (tmp_path / "own.toml").write_text(blocks)
+    coramp.study(str(tmp_path / "own.toml"), jobs=1, out=tmp_path / "own")
+    text = report(tmp_path / "own").read_text()
+    assert "as in the scenario" not in text
+    assert "mainline priority (mainline-priority); slots; no control, fair drivers (unc" in text
+    own = re.search(r'aria-label="All runs">(.*?)</table>', text, re.DOTALL).group(1)
+    told = re.findall(r"<tr><td[^>]*>(.*?)</td><td[^>]*>(.*?)</td>", own)
+    gaps = ("time gap 0 s", "time gap 1.0 s")
+    names = ("mainline priority", "slots", "no control, fair drivers")
+    assert sorted(told) == sorted((name, gap) for name in names for gap in gaps)
+    pairs = re.search(r'aria-label="Differences.*?">(.*?)</table>', text, re.DOTALL).group(1)
+    cells = re.findall(r"<td[^>]*>((?:mainline|slots|no control).*?)</td>", pairs)
+    assert cells
+    assert all(cell.endswith(gaps) for cell in cells)
+    assert "no gaps beyond Eq. 1, seed 1, the first of 2 settings" in captions(text)[1]
+
+
+def test_what_columns_mean_and_how_sure_differences_are_is_said(folder):
+    text = report(folder).read_text()
+    fold = re.search(r"What the columns mean</summary>(.*?)</details>", text, re.DOTALL).group(1)
+    own = re.search(r'aria-label="All runs">(.*?)</table>', text, re.DOTALL).group(1)
+    heads = [h.partition(" (")[0] for h in re.findall(r"<th[^>]*>(.*?)</th>", own)[2:]]
+    assert set(re.findall(r"<dt>(.*?)</dt>", fold)) == set(heads)
+    sure = text.split("<h2>How sure</h2>")[1].split("<h2>")[0]
+    assert "seed by seed on the same arrivals, so they are surer than the means" in sure
+    assert "There are 2 seeds and 60 s of arrivals a run, which is little" in sure
+
+
+def test_how_sure_counts_differences_that_may_be_chance():
+    def delays(strategy, by_seed):
+        return [run_row(strategy, seed=s, delay_s=d) for s, d in enumerate(by_seed, 1)]
+
+    slots = delays("slots", (1.0, 5.0, 9.0))
+    (sure,) = of_differences(runs_of(*slots, *delays("game", (1.5, 5.7, 9.6))))
+    assert sure.endswith("The intervals of all differences in the answer exclude zero.")
+    (unsure,) = of_differences(runs_of(*slots, *delays("game", (1.5, 4.7, 9.6))))
+    assert "The intervals of 1 of the 1 differences in the answer hold zero" in unsure
+    assert list(of_differences(runs_of(*slots))) == []
+
+
+@pytest.mark.parametrize(
+    ("seeds", "horizon_s", "told"),
+    [(3, 60.0, "3 seeds and 60 s"), (1, 60.0, "60 s"), (3, 3600.0, "3 seeds"), (10, 1800.0, None)],
+)
+def test_few_seeds_and_a_short_horizon_are_told(seeds, horizon_s, told):
+    lines = list(of_little(seeds, horizon_s))
+    assert [line.startswith(f"There are {told}") for line in lines] == ([True] if told else [])
+
+
+def test_the_note_on_the_bound_stands_only_beside_it():
+    drivers = runs_of(run_row("uncontrolled"), run_row("uncontrolled", seed=2))
+    assert not any("Least delay" in note for note in overview(drivers).notes)
+    beside = overview(runs_of(run_row(delay_bound_s=1.0)))
+    assert any("Least delay" in note for note in beside.notes)
+
+
+PAIRED = """
+[[runs]]
+strategies = ["mainline-priority", "uncontrolled"]
+flows_veh_h = [[900.0, 400.0]]
+set = { "safety.time_gap_s" = GAP, "safety.standstill_gap_m" = [2.5], "drivers.fair.tau_s" = GAP }
+"""
+
+
+def test_drivers_whose_gaps_vary_along_are_told_with_their_own(tmp_path):
+    blocks = "".join(PAIRED.replace("GAP", gap) for gap in ("[1.0]", "[0.6]"))
+    head = STUDY.partition("[[runs]]")[0].replace("60.0", "30.0")
+    (tmp_path / "own.toml").write_text(head + blocks)
+    said = []
+    coramp.study(str(tmp_path / "own.toml"), jobs=1, out=tmp_path / "own", notice=said.append)
+    text = report(tmp_path / "own").read_text()
+    answer = re.search(r'id="answer">(.*?)</div>', text, re.DOTALL).group(1)
+    assert re.findall(r"\(who keep (.*?)\)", answer) == ["0.6 s + 2.5 m", "1.0 s + 2.5 m"]
+    assert "at unequal gaps" not in answer
+    assert "Drivers drive the same" not in text
+    assert not [line for line in said if "for coordinated vehicles only" in line]
+
+
+def test_what_compares_unequal_gaps_says_so_and_how_to_vary_both(folder):
+    text = report(folder).read_text()
+    answer = re.search(r'id="answer">(.*?)</div>', text, re.DOTALL).group(1)
+    assert len(re.findall(r"over no control, fair drivers at unequal gaps", answer)) == 2
+    assert not re.search(r"over (slots|mainline priority) at unequal gaps", answer)
+    note = re.search(r'<p class="note">(time gap.*?)</p>', text).group(1)
+    assert "same with every value" in note
+    assert "which sets safety.time_gap_s and drivers.fair.tau_s" in note
 
 
 def test_the_files_of_ones_own_are_shown_whole_with_their_names(tmp_path):

@@ -1,6 +1,6 @@
 """What can be said of runs beforehand: demand above the limit, settings without effect."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
@@ -52,24 +52,45 @@ def demands_above_limit(specs: Sequence[RunSpec]) -> str | None:
 def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
     """Returns in a line which settings of runs with drivers bind no driver, or None."""
     of_drivers = [s for s in specs if s.drivers is not None and not s.scenario.gives_shares]
-    found = of_automation([dict(spec.overrides) for spec in of_drivers])
+    found = of_automation([(str(spec.drivers), dict(spec.overrides)) for spec in of_drivers])
     if not found:
         return None
     keys, population = ", ".join(found), of_drivers[0].drivers
     return (
         f"{keys}: for coordinated vehicles only; drivers keep drivers.{population}.tau_s and "
-        f"drivers.{population}.min_gap_m instead"
+        f"drivers.{population}.min_gap_m instead{_recipe(len(of_drivers))}"
     )
 
 
-def of_automation(settings: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Returns which of the settings of runs with drivers bind coordinated vehicles only.
+def _recipe(runs: int) -> str:
+    """How a study varies both, where there are several runs."""
+    return "; to vary both, set both in one [[runs]] block for each value" if runs > 1 else ""
 
-    For several runs, only settings in which the runs differ are returned.
+
+def of_automation(runs: Sequence[tuple[str, Mapping[str, Any]]]) -> list[str]:
+    """Returns which settings of runs with drivers bind coordinated vehicles only.
+
+    A run is its population of drivers and its settings. For several runs, a setting is returned
+    only where runs differ in it whose drivers keep the same gaps: where a study sets both, drivers
+    do change with it.
     """
-    keys = {key: None for found in settings for key in found if key.startswith(OF_AUTOMATION)}
-    values = {key: {str(found.get(key)) for found in settings} for key in keys}
-    return [key for key in keys if len(settings) == 1 or len(values[key]) > 1]
+    keys = {key: None for _, found in runs for key in found if key.startswith(OF_AUTOMATION)}
+    if len(runs) == 1:
+        population, found = runs[0]
+        return [] if any(map(_sets(population), found)) else list(keys)
+    values: dict[tuple[str, str, str], set[str]] = {}
+    for population, found in runs:
+        own = str(sorted((k, str(v)) for k, v in found.items() if _sets(population)(k)))
+        for key in keys:
+            values.setdefault((key, population, own), set()).add(str(found.get(key)))
+    varied = {key for (key, _, _), told in values.items() if len(told) > 1}
+    return [key for key in keys if key in varied]
+
+
+def _sets(population: str) -> Callable[[str], bool]:
+    """Whether a key is a gap that a population of drivers keeps."""
+    gaps = (f"drivers.{population}.tau_s", f"drivers.{population}.min_gap_m")
+    return lambda key: key in gaps
 
 
 def seeds_without_effect(specs: Sequence[RunSpec]) -> str | None:

@@ -118,7 +118,7 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
         case "extra_forbidden":
             return [f"{key}: unknown key; {_allowed_keys(model, problem['loc'])}"]
         case "missing":
-            return [f"{key}: is missing; it must be given"]
+            return [f"{key}: is missing; {_how_to_give(problem['loc'])}"]
         case "finite_number":
             return [f"{key}: {shown} is not finite; allowed is a finite number"]
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
@@ -143,6 +143,16 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
         case _:
             message = problem["msg"]
             return [f"{key}: {shown}: {message[0].lower()}{message[1:]}"]
+
+
+def _how_to_give(place: Location) -> str:
+    """How to give a key that is missing; a stream's limit alone does not say its speed."""
+    if len(place) != 2 or place[0] not in STREAMS or place[1] != "speed_mps":
+        return "it must be given"
+    return (
+        f"give {place[0]}.speed_kmh or {place[0]}.speed_mps, the speed at which vehicles drive; "
+        "the limit follows from it"
+    )
 
 
 def _out_of_range(key: str, value: float, context: Mapping[str, float]) -> str:

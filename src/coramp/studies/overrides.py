@@ -4,6 +4,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+import polars as pl
+
 from coramp.scenarios.loading import load_scenario
 
 
@@ -11,6 +13,11 @@ def overrides_of(run: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the overrides of a run by dotted key; numbers as floats, as scenarios have them."""
     found: dict[str, Any] = json.loads(run["settings"] or "{}")
     return {key: _as_float(value) for key, value in found.items()}
+
+
+def keys_set(runs: pl.DataFrame) -> list[str]:
+    """Returns the dotted keys that any run of ``runs.parquet`` sets, in order."""
+    return sorted({key for row in runs.iter_rows(named=True) for key in overrides_of(row)})
 
 
 def _as_float(value: Any) -> Any:

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, Self
 
 import polars as pl
 
-from coramp.studies.overrides import overrides_of
-from coramp.studies.setting_words import settings_text
+from coramp.studies.overrides import keys_set, overrides_of
+from coramp.studies.setting_words import setting_among, settings_text
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, with_interval
 
@@ -65,8 +65,12 @@ class Cell(NamedTuple):
     @property
     def name(self) -> str:
         """Strategy, drivers and settings in words."""
+        return self.named(self.setting)
+
+    def named(self, setting: str) -> str:
+        """Returns strategy and drivers in words, with a setting."""
         who = f"{self.strategy} ({self.drivers} drivers)" if self.drivers else self.strategy
-        return f"{who}, {self.setting}" if self.setting else who
+        return f"{who}, {setting}" if setting else who
 
 
 class Difference(NamedTuple):
@@ -180,17 +184,24 @@ def _mean(by_seed: Mapping[int, tuple[float | None, ...]]) -> float:
     return estimate([values[0] for values in by_seed.values() if values[0] is not None]).mean
 
 
-def paired_table(good: pl.DataFrame) -> Table | None:
-    """Returns the differences as a table, None where no two cells have the same arrivals."""
-    found = differences(good)
+def paired_table(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) -> Table | None:
+    """Returns the differences as a table, None where no two cells have the same arrivals.
+
+    What a cell does not set and others do is told by the ``scenario``, if that is known.
+    """
+    found, keys = differences(good), keys_set(good)
+    settings = {
+        row["overrides"]: setting_among(overrides_of(row), keys, scenario)
+        for row in good.unique("overrides").iter_rows(named=True)
+    }
     if not found:
         return None
     rows = tuple(
         (
             d.scenario,
             f"{d.flow[0]:g} + {d.flow[1]:g}",
-            d.less.name,
-            d.more.name,
+            d.less.named(settings[d.less.overrides]),
+            d.more.named(settings[d.more.overrides]),
             *map(with_interval, d.by_s),
             "yes" if d.told_apart else "no",
             str(d.by_s[0].values),

@@ -1,6 +1,6 @@
 """Settings of a scenario as a person writes them: "1.0 s + 2.5 m" for the gaps, names elsewhere."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from coramp.scenarios.toml_files import override_text
@@ -52,6 +52,17 @@ def settings_text(settings: Mapping[str, Any], scenario: Mapping[str, Any] | Non
         time_gap_s, standstill_gap_m = (known.get(key) for key in GAPS)
         parts.insert(0, alone + gaps_text(time_gap_s, standstill_gap_m))
     return ", ".join(part for part in parts if part)
+
+
+def setting_among(
+    here: Mapping[str, Any], keys: Iterable[str], scenario: Mapping[str, Any] | None = None
+) -> str:
+    """Returns a setting in words, with the scenario's own value of what others set, by ``keys``.
+
+    Gaps are told by name. What neither sets nor the ``scenario`` tells is left out.
+    """
+    values = {key: here.get(key, scenario_value(scenario or {}, key)) for key in keys}
+    return settings_text({key: value for key, value in values.items() if value is not None})
 
 
 def gaps_text(time_gap_s: float | None, standstill_gap_m: float | None) -> str:

@@ -1,7 +1,8 @@
 """The tables that sum up a study, from its runs alone."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import polars as pl
 
@@ -13,12 +14,12 @@ from coramp.studies.drivers_layout import drivers_tables
 from coramp.studies.field_layout import field_tables
 from coramp.studies.hostile_layout import hostile_tables
 from coramp.studies.metric_labels import LABELS, SPEED, label_of
-from coramp.studies.overrides import overrides_of
+from coramp.studies.overrides import keys_set, overrides_of
 from coramp.studies.paired import paired_table
 from coramp.studies.paper_layout import paper_tables
 from coramp.studies.penetration_layout import penetration_tables
 from coramp.studies.sensitivity_layout import sensitivity_tables
-from coramp.studies.setting_words import settings_text
+from coramp.studies.setting_words import setting_among
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.statistics import Estimate, estimate
 from coramp.studies.tables import Table, number, with_interval
@@ -39,6 +40,14 @@ MEANS = (
     *("mainline_speed_mps", "ramp_speed_mps", "fuel_l"),
 )
 """What the overview has the mean over seeds of, with its interval."""
+AS_GIVEN = "as in the scenario"
+MEAN_NOTE = "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle."
+BOUND = (
+    f"{LABELS['delay_bound_s'].name.capitalize()}: what equal vehicles would lose in the order of "
+    "first come, first served. It is reckoned for each run: where its plans brought a vehicle out "
+    "earlier than its free movement, or two closer than their gaps ask for, that is granted. So it "
+    "differs by strategy."
+)
 IMPORTANT = (
     *("strategy", "setting", "flow (veh/h)", label_of("delay_s"), label_of("mainline_delay_s")),
     *(label_of("ramp_delay_s"), label_of("unserved"), "runs"),
@@ -47,23 +56,40 @@ IMPORTANT = (
 GROUP = ["scenario", "overrides", "drivers", "strategy", "engine", "mainline_veh_h", "ramp_veh_h"]
 
 
-def summary_tables(study: Study, runs: pl.DataFrame, unit: SpeedUnit = MPS) -> list[Table]:
-    """Returns a study's tables: those of its layout, every group of runs, differences, promises."""
+def summary_tables(
+    study: Study,
+    runs: pl.DataFrame,
+    unit: SpeedUnit = MPS,
+    scenario: Mapping[str, Any] | None = None,
+) -> list[Table]:
+    """Returns a study's tables: those of its layout, every group of runs, differences, promises.
+
+    ``scenario`` is the content of the study's scenario: where a run sets nothing, its values are
+    told of what others set, in the tables of a study without a layout of its own.
+    """
     good = runs.filter(status="ok")
     if study.layout == "capacity":
         own = capacity_tables(good, study.horizon_s)
     else:
         make = LAYOUTS.get(study.layout)
         own = make(good) if make is not None else []
-    paired = paired_table(good) if study.layout == "plain" else None
-    return [*own, overview(good, unit), *([paired] if paired is not None else []), promises(runs)]
+    whole = study.layout == "plain"
+    paired = paired_table(good, scenario) if whole else None
+    every = overview(good, unit, scenario if whole else None)
+    return [*own, every, *([paired] if paired is not None else []), promises(runs)]
 
 
-def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
-    """Returns one row a group of runs that differ only by their seed; speeds in a unit."""
+def overview(
+    good: pl.DataFrame, unit: SpeedUnit = MPS, scenario: Mapping[str, Any] | None = None
+) -> Table:
+    """Returns one row a group of runs that differ only by their seed; speeds in a unit.
+
+    What a run does not set and others do is told by the ``scenario``, if that is known.
+    """
     rows = []
+    keys = keys_set(good)
     for key, group in good.group_by(GROUP, maintain_order=True):
-        scenario, _, drivers, strategy, engine, mainline, ramp = key
+        named, _, drivers, strategy, engine, mainline, ramp = key
         means = (
             with_interval(_in(unit if LABELS[column].unit == SPEED else MPS, of(group, column)))
             for column in MEANS
@@ -71,7 +97,7 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
         rows.append(
             (
                 f"{strategy} ({drivers})" if drivers else str(strategy),
-                settings_text(overrides_of(group.row(0, named=True))) or "as in the scenario",
+                setting_among(overrides_of(group.row(0, named=True)), keys, scenario) or AS_GIVEN,
                 f"{mainline:g} + {ramp:g}",
                 *means,
                 str(group["unserved"].sum()),
@@ -79,7 +105,7 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
                 number(largest(group["max_decel_mps2"])),
                 str(group.height),
                 str(engine),
-                str(scenario),
+                str(named),
             )
         )
     columns = (
@@ -88,14 +114,8 @@ def overview(good: pl.DataFrame, unit: SpeedUnit = MPS) -> Table:
         *(label_of(column) for column in ("unserved", "min_ttc_s", "max_decel_mps2")),
         *("runs", "engine", "scenario"),
     )
-    notes = (
-        "Means over seeds with 95 % intervals; delays count waiting outside and every vehicle.",
-        (
-            "The least that the lane allows is lower where vehicles drove faster than the "
-            "mainline's speed, or left closer together than their gaps ask for."
-        ),
-    )
-    return Table("All runs", columns, tuple(rows), notes, IMPORTANT)
+    bound = [BOUND] if good["delay_bound_s"].drop_nulls().len() else []
+    return Table("All runs", columns, tuple(rows), (MEAN_NOTE, *bound), IMPORTANT)
 
 
 def promises(runs: pl.DataFrame) -> Table:

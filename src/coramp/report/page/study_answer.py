@@ -1,23 +1,29 @@
 """What a study says first: by setting who loses how much, and by how much the best is better."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import polars as pl
 
 from coramp.report.style import look_of
+<<<<<<< HEAD
 from coramp.studies.hostile_layout import collisions_table
 from coramp.studies.hostile_runs import DRIVERS_ALONE, cells_of
 from coramp.studies.overrides import overrides_of, scenario_value
+=======
+from coramp.studies.overrides import keys_set, overrides_of, scenario_value
+>>>>>>> newcomer-2
 from coramp.studies.paired import Cell, Difference, differences
 from coramp.studies.penetration_layout import pays_table, series_of
-from coramp.studies.setting_words import gaps_text, settings_text
+from coramp.studies.setting_words import GAPS, gaps_text, settings_text
 from coramp.studies.shown import SHOWN_DRIVERS, plain, shared_flows
 from coramp.studies.statistics import estimate
 from coramp.studies.tables import with_interval
 
 MOST_SETTINGS = 6
 MOST_SHARES = 12
+OF_DRIVERS = ("tau_s", "min_gap_m")
+"""Of a population of drivers the gaps that it keeps, as ``GAPS`` are those of the others."""
 
 
 class Answer(NamedTuple):
@@ -48,6 +54,24 @@ def own_answer(good: pl.DataFrame, scenario: Mapping[str, Any] | None = None) ->
     return Answer(_lead(at, mainline, ramp), items, rest)
 
 
+def answered_differences(good: pl.DataFrame) -> list[Difference]:
+    """Returns the differences between strategies with one setting that ``own_answer`` tells."""
+    if good.is_empty():
+        return []
+    mainline, ramp = shared_flows(good)[-1]
+    at = good.filter(mainline_veh_h=mainline, ramp_veh_h=ramp)
+    best = {}
+    for setting in at["overrides"].unique(maintain_order=True).to_list()[:MOST_SETTINGS]:
+        delays_s = {cell: estimate(values).mean for cell, values in _cells(at, setting)}
+        best[setting] = min(delays_s, key=lambda cell: delays_s[cell])
+    return [
+        found
+        for found in differences(at)
+        if found.less.overrides == found.more.overrides
+        and found.less == best.get(found.less.overrides)
+    ]
+
+
 def _lead(at: pl.DataFrame, mainline: float, ramp: float) -> str:
     seeds = at["seed"].n_unique()
     means = f"mean over {seeds} seeds ± 95 % interval" if seeds > 1 else "one seed, no interval"
@@ -58,10 +82,19 @@ def _label_of_setting(at: pl.DataFrame, setting: str | None, scenario: Mapping[s
     """A setting in words; of what this one does not set and others do, the scenario's own."""
     rows = at.filter(pl.col("overrides").eq_missing(pl.lit(setting, pl.String)))
     here = overrides_of(rows.row(0, named=True))
-    keys = sorted({key for row in at.iter_rows(named=True) for key in overrides_of(row)})
+    keys = keys_set(at)
     values = {key: here.get(key, scenario_value(scenario, key)) for key in keys}
     known = {key: value for key, value in values.items() if value is not None}
     return settings_text(known, scenario) or ("as in the scenario" if keys else "")
+
+
+def _values_in(
+    at: pl.DataFrame, setting: str | None, scenario: Mapping[str, Any]
+) -> Callable[[str], Any]:
+    """What a dotted key is with a setting: set, or the scenario's own; None if not known."""
+    rows = at.filter(pl.col("overrides").eq_missing(pl.lit(setting, pl.String)))
+    here = overrides_of(rows.row(0, named=True))
+    return lambda key: here.get(key, scenario_value(scenario, key))
 
 
 def _item(
@@ -74,11 +107,14 @@ def _item(
     delays_s = dict(_cells(at, setting))
     ordered = sorted(delays_s, key=lambda cell: estimate(delays_s[cell]).mean)
     best = ordered[0]
+    value = _values_in(at, setting, scenario)
     told = [
-        f"{_label(cell, scenario)} {with_interval(estimate(delays_s[cell]))} s" for cell in ordered
+        f"{_label(cell)}{_kept(cell, value)} {with_interval(estimate(delays_s[cell]))} s"
+        for cell in ordered
     ]
     ahead = [
         f"by {with_interval(found.by_s[0])} s over {_label(cell)}"
+        + (" at unequal gaps" if _unequal(best, cell, value) else "")
         + ("" if found.told_apart else " (may be chance)")
         for cell in ordered[1:]
         if (found := apart.get((best, cell))) is not None
@@ -93,17 +129,32 @@ def _cells(at: pl.DataFrame, setting: str | None) -> Iterator[tuple[Cell, list[f
         yield Cell.of_run(group.row(0, named=True)), group["delay_s"].drop_nulls().to_list()
 
 
-def _label(cell: Cell, scenario: Mapping[str, Any] | None = None) -> str:
-    """What a cell is called, drivers with the gaps of their population if these are known."""
-    label = look_of(*cell.who).label
-    population = scenario_value(scenario or {}, f"drivers.{cell.drivers}") if cell.drivers else None
-    if not isinstance(population, Mapping):
-        return label
-    time_gaps_s, gap_m = population.get("tau_s"), population.get("min_gap_m")
+def _label(cell: Cell) -> str:
+    return look_of(*cell.who).label
+
+
+def _gaps_kept(cell: Cell, value: Callable[[str], Any]) -> tuple[Any, Any]:
+    """Time gap (s), or a list of them, and standstill gap (m) that a cell's vehicles keep."""
+    if cell.drivers is None:
+        return tuple(map(value, GAPS))
+    return tuple(value(f"drivers.{cell.drivers}.{key}") for key in OF_DRIVERS)
+
+
+def _kept(cell: Cell, value: Callable[[str], Any]) -> str:
+    """The gaps that drivers keep, in brackets, if these are known; nothing of others."""
+    time_gaps_s, gap_m = _gaps_kept(cell, value)
+    if cell.drivers is None or time_gaps_s is None:
+        return ""
     if isinstance(time_gaps_s, list):
         low, high = min(time_gaps_s), max(time_gaps_s)
-        return f"{label} (who keep {low:g} to {gaps_text(high, gap_m)})"
-    return f"{label} (who keep {gaps_text(time_gaps_s, gap_m)})"
+        return f" (who keep {low:g} to {gaps_text(high, gap_m)})"
+    return f" (who keep {gaps_text(time_gaps_s, gap_m)})"
+
+
+def _unequal(one: Cell, other: Cell, value: Callable[[str], Any]) -> bool:
+    """Whether vehicles of two cells keep gaps that are known and differ."""
+    kept = [_gaps_kept(cell, value) for cell in (one, other)]
+    return None not in (*kept[0], *kept[1]) and kept[0] != kept[1]
 
 
 def layout_answer(good: pl.DataFrame) -> Answer:

@@ -26,7 +26,15 @@ from coramp.report.page.study_answer import (
     own_answer,
     penetration_answer,
 )
-from coramp.report.page.study_repeat import another_setting, repeat_command, watched_text
+from coramp.report.page.study_columns import meanings_of
+from coramp.report.page.study_names import named_as_answered, names_with_options
+from coramp.report.page.study_repeat import (
+    another_setting,
+    place_among,
+    repeat_command,
+    watched_text,
+)
+from coramp.report.page.study_sure import how_sure
 from coramp.report.page.svg import picture
 from coramp.report.penetration_figure import penetration_figure
 from coramp.report.sensitivity_figure import sensitivity_figure
@@ -34,7 +42,7 @@ from coramp.report.study_folder import stored_runs, study_content
 from coramp.report.varied_figure import readable, varied_figure
 from coramp.runs.beforehand import of_automation
 from coramp.studies.definition import Study, count_runs
-from coramp.studies.overrides import overrides_of, scenario_value
+from coramp.studies.overrides import keys_set, overrides_of, scenario_value
 from coramp.studies.setting_words import GAPS, key_name
 from coramp.studies.shown import (
     read_shown,
@@ -42,7 +50,7 @@ from coramp.studies.shown import (
     shown_rows,
 )
 from coramp.studies.speed_unit import MPS, SpeedUnit
-from coramp.studies.summary import promises, summary_tables
+from coramp.studies.summary import summary_tables
 from coramp.studies.tables import Table, without_same
 
 DRAWN = {
@@ -82,7 +90,16 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
     by_flow, said = _shown(folder, good)
     files = content.get("files") or {}
     cells, packs = _cells(by_flow)
-    over_time = [row for runs in by_flow.values() for row in over_time_pictures(runs, unit)]
+    scenario, keys = content["scenario"], keys_set(good)
+    tables = [
+        without_same(named_as_answered(table, good))
+        for table in summary_tables(study, every, unit, scenario)
+    ]
+    over_time = [
+        row
+        for runs in by_flow.values()
+        for row in over_time_pictures(runs, unit, keys, place_among(good, runs))
+    ]
     return assembled(
         "study.html",
         title=f"Report: study {study.name}",
@@ -90,10 +107,16 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
         asked=_asked(study, good, content, unit),
         answer=_answer(study, good, content["scenario"]),
         notes=[*_notes(study, every, listed=_lists_arrivals(content)), *said],
-        tables=[without_same(table) for table in summary_tables(study, every, unit)],
+        tables=tables,
+        meanings=meanings_of(tables),
         pictures=[*pictures_of(study.layout, good, content["scenario"]), *over_time],
         failed=_failed(every),
-        sure=_how_sure(good, listed=_lists_arrivals(content)),
+        sure=how_sure(
+            good,
+            _horizon_s(study, scenario),
+            compared=study.layout == "plain",
+            listed=_lists_arrivals(content),
+        ),
         versions=Table("Versions", ("what", "version"), tuple(content["versions"].items())),
         repeat=repeat_command(study, files, good["seed"].n_unique()),
         files=files,
@@ -127,17 +150,17 @@ def _asked(study: Study, good: pl.DataFrame, content: Row, unit: SpeedUnit) -> T
     rows = (
         ("study", f"{study.name}: {study.description}".rstrip(": ")),
         ("scenario", study.scenario),
-        ("strategies", ", ".join(good["strategy"].unique(maintain_order=True))),
+        ("strategies", "; ".join(names_with_options(good))),
         ("flows, mainline + ramp (veh/h)", f"{shown}, listed one by one" if listed else shown),
         ("seeds", str(good["seed"].n_unique())),
         ("runs", str(good.height)),
-        *_road(content["scenario"], unit, study.horizon_s, good),
+        *_road(content["scenario"], unit, _horizon_s(study, content["scenario"]), good),
     )
     return Table("Study, road and gaps", ("what", "value"), rows)
 
 
 def _road(
-    scenario: Row, unit: SpeedUnit, horizon_s: float | None, good: pl.DataFrame
+    scenario: Row, unit: SpeedUnit, horizon_s: float, good: pl.DataFrame
 ) -> list[tuple[str, str]]:
     """The scenario's road and gaps; of what runs set, all values that they set."""
     mainline, ramp = scenario["mainline"], scenario["ramp"]
@@ -151,8 +174,12 @@ def _road(
     return [
         (f"speeds, mainline and ramp ({unit.name})", " and ".join(f"{v:.4g}" for v in speeds)),
         *told,
-        ("horizon of a run (s)", f"{horizon_s or scenario['simulation']['horizon_s']:g}"),
+        ("horizon of a run (s)", f"{horizon_s:g}"),
     ]
+
+
+def _horizon_s(study: Study, scenario: Row) -> float:
+    return float(study.horizon_s or scenario["simulation"]["horizon_s"])
 
 
 def _values(found: Sequence[Any]) -> str:
@@ -172,9 +199,13 @@ def _notes(study: Study, runs: pl.DataFrame, *, listed: bool) -> Iterator[str]:
         yield f"{runs.height} of {most}{asked} runs with {seeds} seeds are done and reported here."
     keys = _without_effect(runs)
     if keys:
+        population = runs["drivers"].drop_nulls()[0]
         yield (
             f"{', '.join(map(key_name, keys))}: for coordinated vehicles only. Drivers drive the "
-            "same with every value; they keep the gaps of their population (tau_s, min_gap_m)."
+            "same with every value; they keep the gaps of their population (tau_s, min_gap_m). To "
+            "vary both, give each value a [[runs]] block of its own, which sets "
+            f"{' and '.join(keys)} and drivers.{population}.tau_s or "
+            f"drivers.{population}.min_gap_m."
         )
     failed = runs.filter(status="failed").height
     if failed:
@@ -185,7 +216,7 @@ def _without_effect(runs: pl.DataFrame) -> list[str]:
     """The settings of runs with drivers that bind coordinated vehicles only."""
     among_drivers = pl.col("drivers").is_not_null() & pl.col("automated_vehicles").is_null()
     rows = runs.filter(among_drivers).iter_rows(named=True)
-    return of_automation([overrides_of(row) for row in rows])
+    return of_automation([(row["drivers"], overrides_of(row)) for row in rows])
 
 
 def _failed(runs: pl.DataFrame) -> Table | None:
@@ -201,28 +232,6 @@ def _cell(value: object) -> str:
     if value is None:
         return "-"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _how_sure(good: pl.DataFrame, *, listed: bool) -> list[str]:
-    kept = promises(good)
-    seeds = good["seed"].n_unique()
-    alone = " One seed has none; run more (--seeds 10)." if seeds == 1 else ""
-    if listed:
-        means = (
-            "Arrivals are listed: a seed changes drivers alone, and a cooperative run is the same "
-            "with every seed. It runs once, so that it has no interval."
-        )
-    else:
-        means = (
-            f"Means are over {seeds} seeds, each one draw of arrivals and entry speeds, the same "
-            f"for every strategy; ± is a 95 % interval of the mean by Student's t.{alone}"
-        )
-    return [
-        means,
-        "What the cooperative runs promised: "
-        + "; ".join(f"{what}: {value}" for what, value in kept.rows)
-        + ".",
-    ]
 
 
 def pictures_of(

@@ -12,7 +12,7 @@ from coramp.records.schemas import Row
 from coramp.report.page.over_time import setting_of_run
 from coramp.scenarios.toml_files import builtin_names, override_text
 from coramp.studies.definition import Grid, Search, Study, load_study
-from coramp.studies.overrides import overrides_of
+from coramp.studies.overrides import keys_set, overrides_of
 from coramp.studies.setting_words import settings_text
 from coramp.studies.shown import plain, shared_flows
 
@@ -55,15 +55,31 @@ def _file_of(study: Study, files: Mapping[str, str]) -> str:
 
 def watched_text(by_flow: Mapping[str, Sequence[RunRecords]], good: pl.DataFrame) -> str:
     """Returns which runs the curves over time and the replay are of, of all that were computed."""
-    shown = [setting_of_run(runs[0]) for runs in by_flow.values()]
+    keys = keys_set(good)
+    shown = [setting_of_run(runs[0], keys) for runs in by_flow.values()]
     if not shown:
         return ""
-    settings = good["overrides"].n_unique()
-    others = f", one of {settings} settings" if settings > 1 else ""
+    found = place_among(good, [run for runs in by_flow.values() for run in runs])
+    others = f", {found}" if found else ""
     return (
         f"The curves of speed and delay over time, and the replay, are of {'; and of '.join(shown)}"
         f"{others}."
     )
+
+
+def place_among(good: pl.DataFrame, runs: Sequence[RunRecords]) -> str:
+    """Returns which of a study's settings runs have: ``the first of 2 settings``.
+
+    Empty where there is one only.
+    """
+    settings = good["overrides"].unique(maintain_order=True).to_list()
+    if len(settings) < 2:
+        return ""
+    ids = {run.content["run_id"] for run in runs}
+    shown = good.filter(pl.col("run_id").is_in(ids))["overrides"].unique().to_list()
+    place = settings.index(shown[0]) if len(shown) == 1 else -1
+    which = {0: "the first", len(settings) - 1: "the last"}.get(place, "one")
+    return f"{which} of {len(settings)} settings"
 
 
 def another_setting(study: Study, good: pl.DataFrame) -> str:
@@ -78,12 +94,22 @@ def another_setting(study: Study, good: pl.DataFrame) -> str:
     rows = (other if other.height else at.filter(pl.col("seed") > 1)).rows(named=True)
     if not rows:
         return ""
-    chosen = [row for row in rows if (row["overrides"], row["seed"]) == _key(rows[-1], rows)]
-    folders = ("out/a", "out/b")
-    lines = [_run_command(study, row, out) for row, out in zip(chosen, folders, strict=False)]
-    against = f" --against {folders[1]}" if len(lines) > 1 else ""
-    report = f"coramp report {folders[0]}{against}"
-    return "\n".join([f"# another: {_words(chosen[0])}", *lines, report])
+    chosen = _first_and_drivers(
+        [row for row in rows if (row["overrides"], row["seed"]) == _key(rows[-1], rows)]
+    )
+    folders = [f"out/{letter}" for letter in "abc"[: len(chosen)]]
+    lines = [_run_command(study, row, out) for row, out in zip(chosen, folders, strict=True)]
+    reports = [f"coramp report {folders[0]} --against {other}" for other in folders[1:]]
+    return "\n".join(
+        [f"# another: {_words(chosen[0])}", *lines, *(reports or [f"coramp report {folders[0]}"])]
+    )
+
+
+def _first_and_drivers(rows: Sequence[Row]) -> list[Row]:
+    """The first two runs, and the first of drivers where these are none."""
+    first = list(rows[:2])
+    drivers = [row for row in rows[2:] if row["drivers"]]
+    return first if any(row["drivers"] for row in first) else [*first, *drivers[:1]]
 
 
 def _key(last: Row, rows: Sequence[Row]) -> tuple[Any, int]:
