@@ -6,13 +6,9 @@ from typing import Any, NamedTuple
 import polars as pl
 
 from coramp.report.style import look_of
-<<<<<<< HEAD
 from coramp.studies.hostile_layout import collisions_table
 from coramp.studies.hostile_runs import DRIVERS_ALONE, cells_of
-from coramp.studies.overrides import overrides_of, scenario_value
-=======
 from coramp.studies.overrides import keys_set, overrides_of, scenario_value
->>>>>>> newcomer-2
 from coramp.studies.paired import Cell, Difference, differences
 from coramp.studies.penetration_layout import pays_table, series_of
 from coramp.studies.setting_words import GAPS, gaps_text, settings_text
