@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from coramp.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION, grid, legend_below, new_figure
 from coramp.studies.hostile_layout import conflict_rates
@@ -19,7 +18,6 @@ CONFLICT = "conflicts_ttc_1_5"
 APART = 0.16
 """How far the points of two shares of a fault lie apart."""
 ROW_IN = 0.32
-MOST_TICKS = 4
 
 
 def hostile_figure(runs: pl.DataFrame) -> Figure:
@@ -44,8 +42,7 @@ def hostile_figure(runs: pl.DataFrame) -> Figure:
             _draw(conflicts, at, faults, shares, _conflicts)
         delays.axvline(100.0, color=GREY, linestyle=":", linewidth=1.0)
         delays.set_xscale("log")
-        delays.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        delays.xaxis.set_major_locator(LogLocator(numticks=MOST_TICKS))
+        delays.xaxis.set_major_formatter(lambda value, _: _short(value))
         delays.xaxis.set_minor_formatter(lambda *_: "")
         conflicts.set_xscale("symlog", linthresh=1.0)
         conflicts.set_xlim(left=-0.1)
@@ -60,6 +57,11 @@ def hostile_figure(runs: pl.DataFrame) -> Figure:
     if cells:
         legend_below(figure, diagrams, max(1, len(shares)))
     return figure
+
+
+def _short(value: float) -> str:
+    """A number with thousands as k: over several decades long ones lie on one another."""
+    return f"{value / 1000.0:g}k" if value >= 1000.0 else f"{value:g}"
 
 
 def _conflicts(cell: Cell) -> Estimate:

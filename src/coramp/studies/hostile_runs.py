@@ -138,7 +138,8 @@ def _line_of(run: Run) -> Line:
     if who == UNCONTROLLED:
         who = DRIVERS_ALONE if share == 0.0 else AUTOMATION_ALONE
     flow = (run["mainline_veh_h"], run["ramp_veh_h"])
-    return Line(who, run["drivers"] or "none", settings_text(others), flow, fault_name(faults))
+    setting = settings_text(others) or "-"
+    return Line(who, run["drivers"] or "none", setting, flow, fault_name(faults))
 
 
 def _share_of(run: Run) -> float:
