@@ -23,8 +23,6 @@ NUMBER, STAMP, STATION, SPEED, ON_MAINLINE = range(5)
 GIVEN, MOST, MERGE = 1, 2, 3
 """Columns of a command, after the number of its vehicle."""
 BEYOND_M = 20.0
-STANDS_MPS = 0.5
-"""Slower than this a vehicle that goes by itself may merge, lest it block the ramp for ever."""
 
 
 @dataclass
@@ -162,8 +160,8 @@ class Air:
         """Returns the bound (m/s2) that each vehicle on the road has, and who may merge.
 
         What is older than what a vehicle has changes nothing, and one that is silent hears nothing.
-        A vehicle whose last command is overdue goes by itself: it keeps its distances, and does not
-        merge before it stands.
+        A vehicle whose last command is overdue goes by itself: it keeps its distances, and merges
+        where it sees that all distances are kept. Who waited for leave would hold up the ramp.
         """
         for row in self._commands.received(now_s):
             number = int(row[NUMBER])
@@ -177,7 +175,7 @@ class Air:
         self._count_fallbacks(users, valid, command)
         obeys = valid & ~self._disobeys[users.number] & users.automated
         most_mps2 = np.where(obeys, command[:, MOST], np.inf)
-        alone = users.automated & ~obeys & (users.speed_mps < STANDS_MPS)
+        alone = users.automated & ~obeys
         return most_mps2, alone | obeys & (command[:, MERGE] > 0.5)
 
     def _count_fallbacks(self, users: RoadUsers, valid: BoolArray, command: FloatArray) -> None:
