@@ -174,7 +174,7 @@ def test_who_did_not_look_ahead_would_touch():
 
 def test_nobody_merges_ahead_of_one_that_could_only_stop_beyond():
     """The one behind is slow and brakes, but with its lag it stops past who merges."""
-    rows = [(100.0, 0.0, False, True), (92.0, 4.0, True, True)]
+    rows = [(196.0, 0.0, False, True), (188.5, 4.0, True, True)]
     users = users_of(rows)
     for way_m, allowed in ((0.5, True), (6.0, False)):
         ahead = Ahead(np.array([0.0, way_m]), np.array([0.0, 0.3]), 2.0)

@@ -54,8 +54,9 @@ class SafetyLaw(NamedTuple):
     It stays behind a leader that brakes at ``braking_mps2`` if it reacts after ``reaction_s`` and
     brakes at that rate too, with ``margin_m`` to spare; ``hardest_mps2`` is what its brakes can do.
     It can stop with ``stop_mps2`` before ``lane_end_m``. A lane change leaves a driver behind
-    s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``; and asks nobody automated
-    for more than ``gentle_mps2``, at the lane's end ``gentle_at_end_mps2`` more.
+    s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``; one who is slower is
+    judged by ``driver_dry_mps2`` on any road. It asks nobody automated for more than
+    ``gentle_mps2``, at the lane's end ``gentle_at_end_mps2`` more.
     """
 
     braking_mps2: float = 6.0
@@ -65,6 +66,7 @@ class SafetyLaw(NamedTuple):
     stop_mps2: float = 1.65
     lane_end_m: float = 197.0
     driver_mps2: float = 4.5
+    driver_dry_mps2: float = 4.5
     relax_m: float = 0.96
     gentle_mps2: float = 0.68
     gentle_at_end_mps2: float = 5.0

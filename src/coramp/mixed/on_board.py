@@ -25,8 +25,8 @@ TOUCHING_M = 1.5
 """Nobody changes lanes with less than this before or behind it."""
 READY_M = 1.0
 """The first metres of the acceleration lane are no place to change."""
-REAR_BRAKES_MPS2 = 2.0
-"""What a lane change may ask of an automated vehicle behind before its next command."""
+REAR_BRAKES_SHARE = 3.0
+"""A lane change may ask of an automated vehicle behind for b divided by this before it reacts."""
 
 
 class Ahead(NamedTuple):
@@ -102,7 +102,7 @@ def may_change_lane(
     """Returns whether a lane change of a vehicle on the acceleration lane keeps all distances.
 
     Its own to the vehicle in front; that of an automated vehicle behind, which may have to brake at
-    2 m/s2; and, of a driver behind, what he would keep and braking in comfort takes:
+    a third of b; and, of a driver behind, what he would keep and braking in comfort takes:
     s_0 + T v_Y + (v_Y^2 - v^2) / (2 b), with v = ``slowest_mps``, to which it may slow down before
     it is there.
     """
@@ -125,12 +125,13 @@ def may_change_lane(
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        braking_m = (rear_mps**2 - slowest_mps**2) / (2.0 * law.driver_mps2)
+        squares = rear_mps**2 - slowest_mps**2
+        braking_m = max(squares / (2.0 * law.driver_mps2), squares / (2.0 * law.driver_dry_mps2))
         needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
         return bool(free_m >= max(TOUCHING_M, needs_m))
     keeps_mps = _keeps_mps(users, rear, own, ahead, law)
     spare_mps = keeps_mps - ahead.speed_mps[rear]
-    if free_m < TOUCHING_M or spare_mps < -REAR_BRAKES_MPS2 * law.reaction_s:
+    if free_m < TOUCHING_M or spare_mps < -law.braking_mps2 / REAR_BRAKES_SHARE * law.reaction_s:
         return False
     if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < TOUCHING_M:
         return False  # it would only come to a stand beyond

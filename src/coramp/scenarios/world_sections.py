@@ -212,7 +212,7 @@ PRESETS: dict[str, dict[str, dict[str, Any]]] = {
         "reports": {"delay_s": 0.05, "delay_shape": 2.0, "loss": 0.1},
         "commands": {"delay_s": 0.05, "delay_shape": 2.0, "loss": 0.1},
         "actuators": {"lag_s": 0.4},
-        "road": {"adhesion": 0.35, "assumed_adhesion": 0.3},
+        "road": {"adhesion": 0.3, "assumed_adhesion": 0.3},
     },
 }
 """Faults that come together.
@@ -221,7 +221,8 @@ PRESETS: dict[str, dict[str, dict[str, Any]]] = {
 private networks (3GPP TS 22.186 asks for 3 to 100 ms). ``gnss-its-g5``: single-frequency GNSS at
 1.5 m (1 sigma), and cooperative awareness messages over ITS-G5 (ETSI EN 302 637-2: 1 to 10 Hz; here
 5 Hz, latency within 100 ms). ``urban-canyon``: errors of 5 m and outages between buildings, losses
-in bursts. ``winter``: adhesion on packed snow of about 0.3 to 0.4 (dry asphalt: 0.8 to 0.9).
+in bursts. ``winter``: adhesion on packed snow of about 0.3 (dry asphalt: 0.8 to 0.9), which
+automated vehicles know.
 """
 
 
