@@ -9,7 +9,7 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
-from coramp.messages.kinds import MESSAGES
+from coramp.messages import kinds
 from coramp.records import schemas
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.defaults import DERIVED
@@ -44,7 +44,7 @@ FILES = {
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
     "streams.parquet": schemas.STREAM_ROWS,
-    "messages.parquet": MESSAGES,
+    "messages.parquet": kinds.COLUMNS,
 }
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}
 

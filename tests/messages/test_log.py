@@ -7,12 +7,13 @@ import pytest
 from coramp.errors import CorampError
 from coramp.messages.commands import Enter, Follow, SetSignal
 from coramp.messages.events import DetectorReading, RequestToEnter
-from coramp.messages.kinds import KINDS, LOG_VERSION, MESSAGES
+from coramp.messages.kinds import COLUMNS, KINDS, LOG_VERSION
 from coramp.messages.log import NO_POSITIONS, Positions, Told, _row, as_frame
 from coramp.messages.log_reader import read_log
 from coramp.vehicles.traits import Traits
 
 STEP_S = 0.1
+EVERY = {"version", "time_s", "kind"}
 CRUISE = np.array([[0.5, -1000.0, 20.0, 0.0]])
 REQUESTS = [RequestToEnter("m1", False, 5, 20.0, 5.0), RequestToEnter("r1", True, 7, 16.0, 16.5)]
 COMMANDS = [
@@ -64,7 +65,7 @@ def refusal(frame, folder):
 def changed(frame, row, **values):
     columns = {
         name: pl.when(pl.int_range(pl.len()) == row)
-        .then(pl.lit(value, MESSAGES[name]))
+        .then(pl.lit(value, COLUMNS[name]))
         .otherwise(pl.col(name))
         for name, value in values.items()
     }
@@ -73,7 +74,7 @@ def changed(frame, row, **values):
 
 def test_everything_stands_in_the_order_in_which_it_was_told():
     frame = log_frame()
-    assert list(frame.columns) == list(MESSAGES)
+    assert list(frame.columns) == list(COLUMNS)
     assert frame["version"].unique().to_list() == [LOG_VERSION]
     told = frame.select("time_s", "kind", "vehicle_id").rows()
     assert told == [
@@ -116,7 +117,7 @@ def test_each_message_has_the_columns_of_its_kind():
     frame, seen = every_kind(), set()
     for row in frame.iter_rows(named=True):
         has = {name for name, value in row.items() if value is not None}
-        assert KINDS[row["kind"]].fits(has - {"version", "time_s", "kind"}), row
+        assert KINDS[row["kind"]].fits(has - EVERY), row
         seen.add(row["kind"])
     assert seen == set(KINDS)
 
@@ -136,6 +137,22 @@ def test_what_any_kind_needs_is_asked_for(name, tmp_path):
         line = refusal(changed(frame, row, **{column: None}), tmp_path)
         assert line.startswith(f"row {row} ")
         assert line.endswith(f"{name}): has no {column}; allowed is a value")
+
+
+VALUES = {pl.Int64: 1, pl.Float64: 0.25, pl.String: "car", pl.Boolean: True}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_value_that_a_kind_does_not_have_is_refused(name, tmp_path):
+    frame, kind = every_kind(), KINDS[name]
+    row = frame["kind"].to_list().index(name)
+    assert {*kind.lacks, *kind.needs, *kind.may_have} | EVERY == set(COLUMNS)
+    for column in kind.lacks:
+        value = VALUES.get(COLUMNS[column], [0.5])
+        line = refusal(changed(frame, row, **{column: value}), tmp_path)
+        assert line.startswith(f"row {row} ")
+        allowed = f"a message of kind {name} has no such column; allowed is null"
+        assert line.endswith(f"{name}): {column} {value}: {allowed}")
 
 
 def test_what_is_read_is_what_was_told(tmp_path):

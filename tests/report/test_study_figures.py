@@ -9,6 +9,7 @@ from coramp.report.capacity_figure import capacity_figure
 from coramp.report.flow_figures import delay_figure, flows_of, gain_figure, rung_figure
 from coramp.report.sensitivity_figure import sensitivity_figure, settings_of
 from coramp.report.style import COOPERATIVE, FREE_MARKERS, METERED, UNCONTROLLED, look_of
+from coramp.strategies.registry import OURS, origin_of, strategies
 from tests.study import overridden, run_row, runs_of
 
 FLOWS = [(800.0, 200.0), (1800.0, 500.0)]
@@ -92,6 +93,13 @@ def test_strategies_differ_by_more_than_colour():
     assert look_of("mine").label == "mine"
     assert look_of("mine") == look_of("mine")
     assert look_of("uncontrolled", "sleepy").label == "uncontrolled (sleepy)"
+
+
+def test_every_strategy_of_our_own_has_a_look():
+    ours = {n: found for n, found in strategies().items() if origin_of(n) == OURS}
+    expected = {n for n, found in ours.items() if found.cooperative}
+    assert set(COOPERATIVE) == expected
+    assert set(METERED) == set(ours) - expected - {"uncontrolled"}
 
 
 def test_no_two_known_strategies_share_colour_and_marker():

@@ -39,7 +39,6 @@ from coramp.strategies.base import is_metered
 from coramp.strategies.registry import strategy_named
 
 FIGURES = (
-    "collisions",
     "safety_violations",
     "min_margin_m",
     "min_margin_equation",
@@ -55,6 +54,8 @@ FIGURES = (
     "unserved",
     "plan_error_m",
 )
+"""The figures of a run that are derived from its log and compared; collisions are judged apart."""
+COLLISIONS = "collisions"
 TOO_SELDOM = "drivers report once a second, and are under no commitment"
 
 
@@ -144,7 +145,7 @@ def _of_drivers(inputs: Inputs) -> list[Check]:
     checks.append(_end(inputs, inputs.run.vehicles["exit_s"].fill_null(np.inf).to_numpy()))
     if is_metered(strategy):
         checks.insert(0, check_signals(inputs))
-    return [*checks, *(unchecked(name, TOO_SELDOM) for name in FIGURES)]
+    return [*checks, *(unchecked(name, TOO_SELDOM) for name in (COLLISIONS, *FIGURES))]
 
 
 def _figures(inputs: Inputs, motion: Motion) -> list[Check]:
@@ -172,18 +173,19 @@ def _figures(inputs: Inputs, motion: Motion) -> list[Check]:
     if error_m > PLAN_ERROR_M:  # then the run's figures are those of SUMO's positions at each step
         why = f"SUMO was {error_m:.3f} m off a plan, and the log has not all of its positions"
         checks = [_figure(inputs, "plan_error_m", error_m)]
-        checks += [unchecked(name, why) for name in FIGURES if name != "plan_error_m"]
+        others = (name for name in (COLLISIONS, *FIGURES) if name != "plan_error_m")
+        checks += [unchecked(name, why) for name in others]
         return [*checks, unchecked("violations.parquet", why), _vehicles(inputs, passages)]
     checks = [_collisions(inputs, derived)]
-    checks += [_figure(inputs, name, figures[name]) for name in FIGURES[1:]]
+    checks += [_figure(inputs, name, figures[name]) for name in FIGURES]
     return [*checks, _violations(inputs, derived), _vehicles(inputs, passages)]
 
 
 def _collisions(inputs: Inputs, derived: Derived) -> Check:
-    told = inputs.run.summary.get("collisions")
+    told = inputs.run.summary.get(COLLISIONS)
     overlap = derived.least_gap_m < -ROUNDING
     if told and overlap:
-        return unchecked("collisions", f"{told} by SUMO's own count; vehicles do overlap")
+        return unchecked(COLLISIONS, f"{told} by SUMO's own count; vehicles do overlap")
     findings = []
     if told or told is None:
         text = f"collisions: {told!r} is recorded, but no vehicles overlap"
@@ -193,7 +195,7 @@ def _collisions(inputs: Inputs, derived: Derived) -> Check:
         text = f"collisions: {told!r} is recorded, but vehicles overlap by {overlap_m:.3f} m"
         findings = [Finding("run.json", text)]
     how = f"{told}; the least gap in a lane is {derived.least_gap_m:.3f} m"
-    return judged("collisions", how, findings)
+    return judged(COLLISIONS, how, findings)
 
 
 def _figure(inputs: Inputs, name: str, found: float | None) -> Check:

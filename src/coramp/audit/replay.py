@@ -97,6 +97,6 @@ def replayed_signals(log: MessageLog, scenario: Scenario, strategy: Decider) -> 
 
 def reports_at(log: MessageLog, step: int) -> list[Report]:
     """Returns the reports of a step, in the order of the log."""
-    rows = np.flatnonzero((log.step == step) & (log.kind == CODES[REPORT]))
+    rows = np.flatnonzero((log.step == step) & (log.codes == CODES[REPORT]))
     told = log.frame[rows].select("vehicle_id", "time_s", "station_m", "speed_mps")
     return [Report(*row) for row in told.iter_rows()]

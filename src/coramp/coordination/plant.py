@@ -1,4 +1,7 @@
-"""What the loop needs of a world that carries vehicles: a simulator, the exact engine, a road."""
+"""What the loop needs of a world that carries vehicles: a simulator, or a road.
+
+The exact engine has none: what is committed is what is driven.
+"""
 
 from coramp.messages.channel import Plant
 from coramp.messages.events import RequestToEnter

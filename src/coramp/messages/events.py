@@ -60,7 +60,12 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledgement:
-    """A vehicle has the command that was given at ``commanded_s``."""
+    """A vehicle has the command that was given at ``commanded_s``.
+
+    A world with a lossy channel would send these to ``coordination.service``. The worlds of coramp
+    create none, since no command is lost: ``messages.log`` writes the row after each entry and
+    command itself.
+    """
 
     vehicle_id: str
     time_s: float

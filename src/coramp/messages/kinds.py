@@ -1,4 +1,19 @@
-"""The kinds of messages, their columns and their order: what writer and reader of a log share."""
+"""The kinds of messages, their columns and their order: what writer and reader of a log share.
+
+Classes of ``messages.events`` and ``messages.commands``, and the kinds that they have in a log:
+
+=================== ============================================================================
+``RequestToEnter``  request
+``Report``          report
+``DetectorReading`` reading
+``Acknowledgement`` acknowledgement; ``messages.log`` writes one after each entry and command
+``Enter``           entry
+``Follow``          command
+``SetSignal``       signal
+no class            comparison, which is an entry of ``messages.log.Positions``, as reports of a
+                    whole run are; end, from ``messages.log.Told.end_step``
+=================== ============================================================================
+"""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -12,7 +27,7 @@ LOG_VERSION = 2
 TRAIT_COLUMNS = tuple(Traits._fields)
 """Columns of what a vehicle can do: null where only the common limits bind it."""
 PIECES = ("piece_time_s", "piece_station_m", "piece_speed_mps", "piece_accel_mps2")
-MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
+COLUMNS: dict[str, pl.DataType | type[pl.DataType]] = {
     "version": pl.Int64,
     "time_s": pl.Float64,
     "kind": pl.String,
@@ -34,6 +49,8 @@ MESSAGES: dict[str, pl.DataType | type[pl.DataType]] = {
     **{name: pl.Float64 for name in TRAIT_COLUMNS if name != "length_m"},
 }
 """The columns of a log. A message has those of its kind, and null in all others."""
+EVERY_KIND = ("version", "time_s", "kind")
+"""Columns that every message has."""
 
 
 class Kind(NamedTuple):
@@ -50,6 +67,12 @@ class Kind(NamedTuple):
     def fits(self, columns: Collection[str]) -> bool:
         """Whether a message of this kind may have just these columns."""
         return set(self.needs) <= set(columns) <= {*self.needs, *self.may_have}
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Columns that a message of this kind cannot have, in their order."""
+        own = {*EVERY_KIND, *self.needs, *self.may_have}
+        return tuple(name for name in COLUMNS if name not in own)
 
 
 REPORT, COMPARISON, READING, REQUEST, ENTRY, COMMAND, ACKNOWLEDGEMENT, SIGNAL, END = (

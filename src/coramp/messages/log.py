@@ -15,13 +15,13 @@ from coramp.messages.commands import Enter, SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.messages.kinds import (
     ACKNOWLEDGEMENT,
+    COLUMNS,
     COMMAND,
     COMPARISON,
     END,
     ENTRY,
     KINDS,
     LOG_VERSION,
-    MESSAGES,
     PIECES,
     READING,
     REPORT,
@@ -88,7 +88,7 @@ def as_frame(told: Told, step_s: float) -> pl.DataFrame:
         *(row for command in told.commands for row in _command(command, step_s)),
         _row(END, told.end_step * step_s),
     ]
-    frame = pl.concat([_positions(told, step_s), pl.DataFrame(rows, schema=MESSAGES)])
+    frame = pl.concat([_positions(told, step_s), pl.DataFrame(rows, schema=COLUMNS)])
     return frame.with_columns(version=pl.lit(LOG_VERSION, pl.Int64)).sort(
         "time_s", place_of_each(), name_in_order(), maintain_order=True
     )
@@ -123,12 +123,12 @@ def _positions(told: Told, step_s: float) -> pl.DataFrame:
         "kind": np.where(seen.comparison, COMPARISON, REPORT).astype(object),
         **_checked(COMPARISON, _checked(REPORT, position)),
     }
-    schema = {name: MESSAGES[name] for name in columns}
+    schema = {name: COLUMNS[name] for name in columns}
     frame = pl.DataFrame(columns, schema=schema).with_columns(
         pl.col("accel_mps2").fill_nan(None),
-        *(pl.lit(None, MESSAGES[name]).alias(name) for name in MESSAGES if name not in schema),
+        *(pl.lit(None, COLUMNS[name]).alias(name) for name in COLUMNS if name not in schema),
     )
-    return frame.select(list(MESSAGES))
+    return frame.select(list(COLUMNS))
 
 
 def _reading(reading: DetectorReading) -> dict[str, Any]:

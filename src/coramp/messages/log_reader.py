@@ -11,12 +11,12 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.errors import CorampError
 from coramp.messages.kinds import (
     CODES,
+    COLUMNS,
     COMMAND,
     END,
     ENTRY,
     KINDS,
     LOG_VERSION,
-    MESSAGES,
     PIECES,
     REQUEST,
     name_in_order,
@@ -29,16 +29,17 @@ from coramp.road.streams import STREAMS
 class MessageLog:
     """A log that could be read: one entry a message in each array, numbers nan where there is none.
 
-    ``vehicle`` is the number of its vehicle's request, -1 where there is none; ``strangers`` are
-    rows about vehicles of the run that never asked to enter. ``requests`` are the rows of the
-    requests, by number. ``places`` are the messages' rows in the file. Commands' pieces are
-    ``pieces[first[row] : first[row + 1]]``.
+    ``codes`` are the messages' kinds, as ``kinds.CODES`` numbers them. ``vehicle`` is the number
+    of its vehicle's request, -1 where there is none; ``strangers`` are rows about vehicles of the
+    run that never asked to enter. ``requests`` are the rows of the requests, by number.
+    ``places`` are the messages' rows in the file. Commands' pieces are ``pieces[first[row] :
+    first[row + 1]]``.
     """
 
     path: Path
     frame: pl.DataFrame
     places: IntArray
-    kind: IntArray
+    codes: IntArray
     step: IntArray
     vehicle: IntArray
     requests: IntArray
@@ -48,8 +49,7 @@ class MessageLog:
 
     def of_kind(self, *kinds: str) -> IntArray:
         """Returns the rows of these kinds."""
-        codes = [CODES[kind] for kind in kinds]
-        return np.flatnonzero(np.isin(self.kind, codes))
+        return np.flatnonzero(np.isin(self.codes, [CODES[kind] for kind in kinds]))
 
     def numbers(self, column: str) -> FloatArray:
         """Returns a column of numbers, nan where there is none."""
@@ -94,15 +94,13 @@ def read_log(
         frame, keys, step = frame[places], keys[places], step[places]
     _check_order(path, frame, keys)
     _check_end(path, frame)
-    kind = frame["kind"].replace_strict(CODES)
+    codes = frame["kind"].replace_strict(CODES).to_numpy()
     vehicle, requests, strangers = _vehicles(path, frame, of_run)
     counts = frame[PIECES[0]].list.len().fill_null(0).to_numpy()
     commands = frame.filter(pl.col("kind").is_in([ENTRY, COMMAND]))
     pieces = np.column_stack([commands[name].explode().to_numpy() for name in PIECES])
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    return MessageLog(
-        path, frame, places, kind.to_numpy(), step, vehicle, requests, strangers, first, pieces
-    )
+    return MessageLog(path, frame, places, codes, step, vehicle, requests, strangers, first, pieces)
 
 
 def _read(path: Path) -> pl.DataFrame:
@@ -116,12 +114,12 @@ def _read(path: Path) -> pl.DataFrame:
     if frame.height and versions != [LOG_VERSION]:
         told = next(version for version in versions if version != LOG_VERSION)
         raise CorampError(f"{path}: version: {told} cannot be read; allowed is {LOG_VERSION}")
-    if dict(frame.schema) != {name: _plain(kind) for name, kind in MESSAGES.items()}:
-        wrong = [n for n, kind in MESSAGES.items() if frame.schema.get(n) != _plain(kind)]
-        wrong += [n for n in frame.columns if n not in MESSAGES]
+    if dict(frame.schema) != {name: _plain(dtype) for name, dtype in COLUMNS.items()}:
+        wrong = [n for n, dtype in COLUMNS.items() if frame.schema.get(n) != _plain(dtype)]
+        wrong += [n for n in frame.columns if n not in COLUMNS]
         raise CorampError(
             f"{path}: columns are not those of version {LOG_VERSION} "
-            f"({', '.join(wrong) or 'order'}); allowed are {', '.join(MESSAGES)}"
+            f"({', '.join(wrong) or 'order'}); allowed are {', '.join(COLUMNS)}"
         )
     if frame.is_empty():
         raise CorampError(
@@ -130,8 +128,8 @@ def _read(path: Path) -> pl.DataFrame:
     return frame
 
 
-def _plain(kind: pl.DataType | type[pl.DataType]) -> pl.DataType:
-    return kind() if isinstance(kind, type) else kind
+def _plain(dtype: pl.DataType | type[pl.DataType]) -> pl.DataType:
+    return dtype() if isinstance(dtype, type) else dtype
 
 
 def _refuse(path: Path, frame: pl.DataFrame, wrong: BoolArray, told: str) -> None:
@@ -147,12 +145,12 @@ def _refuse(path: Path, frame: pl.DataFrame, wrong: BoolArray, told: str) -> Non
 
 
 def _check_values(path: Path, frame: pl.DataFrame) -> None:
-    """Refuses kinds that are none, numbers that are not finite, and what a kind lacks."""
+    """Refuses kinds that are none, numbers that are not finite, and columns not of the kind."""
     kinds = ", ".join(KINDS)
     known = frame["kind"].is_in(list(KINDS)).fill_null(value=False).to_numpy()
     _refuse(path, frame, ~known, f"there is no kind {{kind!r}}; allowed are {kinds}")
-    for name, kind in MESSAGES.items():
-        if kind == pl.Float64:
+    for name, dtype in COLUMNS.items():
+        if dtype == pl.Float64:
             wrong = ~frame[name].is_finite().fill_null(name != "time_s").to_numpy()
             _refuse(path, frame, wrong, f"{name} {{{name}}} cannot be; allowed are finite numbers")
         if name in PIECES:
@@ -164,6 +162,10 @@ def _check_values(path: Path, frame: pl.DataFrame) -> None:
         for name in known_kind.needs:
             lacks = here & frame[name].is_null().to_numpy()
             _refuse(path, frame, lacks, f"has no {name}; allowed is a value")
+        for name in known_kind.lacks:
+            has = here & frame[name].is_not_null().to_numpy()
+            told = f"a message of kind {said} has no such column; allowed is null"
+            _refuse(path, frame, has, f"{name} {{{name}}}: {told}")
     counts = np.column_stack([frame[n].list.len().fill_null(0).to_numpy() for n in PIECES])
     commands = frame["kind"].is_in([ENTRY, COMMAND]).to_numpy()
     uneven = (counts != counts[:, :1]).any(axis=1) | (commands != (counts[:, 0] > 0))

@@ -11,7 +11,7 @@ from coramp.metrics.lane_uses import lane_uses
 from coramp.metrics.motion import hardest_braking_mps2, largest_jerk_mps3
 from coramp.metrics.separations import (
     DRAC,
-    FIGURES,
+    FIGURE_COUNT,
     MARGIN,
     MERGE_FRONT,
     MERGE_REAR,
@@ -92,12 +92,8 @@ def _largest(values: FloatArray) -> float | None:
 def violations_table(outcome: Outcome, scenario: Scenario, count: int) -> pl.DataFrame:
     """Returns the ``count`` violations of a run, by time; at which the margin was least."""
     lanes = _extremes_of_lanes(outcome, scenario, count)
-    noted = np.concatenate(
-        [
-            lane[FIGURES : FIGURES + NOTED * int(lane[VIOLATION_COUNT])].reshape(-1, NOTED)
-            for lane in lanes
-        ]
-    )
+    told = [lane[FIGURE_COUNT:][: NOTED * int(lane[VIOLATION_COUNT])] for lane in lanes]
+    noted = np.concatenate(told).reshape(-1, NOTED)
     noted = noted[np.argsort(noted[:, 0], kind="stable")]
     names = outcome.passages.vehicle_id
     return frame_of(

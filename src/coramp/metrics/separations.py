@@ -29,7 +29,7 @@ LEAVE, ENTER = 0, 1
 MARGIN, TTC, DRAC, SEVERITY, VIOLATION_COUNT, MERGE_FRONT, MERGE_REAR = range(7)
 EXACT_M = 1e-8
 """What rounding may take from a distance that the checker has measured to 1e-9 m."""
-FIGURES, NOTED = 7, 4
+FIGURE_COUNT, NOTED = 7, 4
 """How many figures there are, and how many numbers tell of one violation."""
 
 
@@ -62,7 +62,7 @@ def lane_extremes(
     come nearer than one of these. The first ``room`` of them follow, four numbers each:
     time (s) of the least margin, front vehicle, rear vehicle, margin (m).
     """
-    extremes = np.zeros(FIGURES + NOTED * room)
+    extremes = np.zeros(FIGURE_COUNT + NOTED * room)
     extremes[MARGIN] = extremes[TTC] = math.inf
     extremes[MERGE_FRONT] = extremes[MERGE_REAR] = math.inf
     times_s, kinds, vehicles = lane_events(lane)
@@ -189,7 +189,7 @@ def _end_pair(
 def _note_violation(
     extremes: FloatArray, time_s: float, front: int, rear: int, margin_m: float
 ) -> None:
-    place = FIGURES + NOTED * int(extremes[VIOLATION_COUNT])
+    place = FIGURE_COUNT + NOTED * int(extremes[VIOLATION_COUNT])
     if place < len(extremes):
         extremes[place], extremes[place + 1] = time_s, front
         extremes[place + 2], extremes[place + 3] = rear, margin_m

@@ -9,6 +9,7 @@ from coramp.motion.following import speed_up
 from coramp.records.outcome import Passages
 from coramp.records.schemas import Row
 from coramp.road.rules import packed, unpacked
+from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import ACCELERATION, LENGTH, POWER, TOP_SPEED, Traits, cruise_mps
 
@@ -82,7 +83,7 @@ def type_figures(
                 rows.append(
                     {
                         "vehicle_type": kind,
-                        "stream": "ramp" if on_ramp else "mainline",
+                        "stream": STREAMS[on_ramp],
                         "vehicles": int(own.sum()),
                         "unserved": int((~finished[own]).sum()),
                         "delay_s": float(delay_s[own].mean()),

@@ -1,4 +1,4 @@
-"""The columns of all result files, in one place."""
+"""The columns of all result files, in one place; ``messages.kinds`` has those of messages."""
 
 from typing import Any
 

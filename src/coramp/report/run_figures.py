@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from coramp.metrics.motion import BIN_S
 from coramp.records.run import RunRecords
 from coramp.report.style import BLACK, COLOURS, LINES, grid, legend_below, look_of, new_figure
+from coramp.road.streams import STREAMS
 
 SMOOTH_S = 60
 """Over how many bins of 1 s the bold lines are means, each bin weighed by its vehicles."""
@@ -49,7 +50,7 @@ def both_speeds_figure(run: RunRecords) -> Figure:
     """
     figure = new_figure(9.0, 4.6)
     diagrams = figure.subplots(2, 1, sharex=True)
-    for axes, stream in zip(diagrams, ("mainline", "ramp"), strict=True):
+    for axes, stream in zip(diagrams, STREAMS, strict=True):
         _draw_speed(axes, run, stream)
         axes.set(ylabel=f"{stream} speed (m/s)", xlim=(0.0, run.scenario.simulation.horizon_s))
     who = look_of(run.content["strategy"], run.content["drivers"]).label

@@ -18,8 +18,8 @@ from coramp.equations.safe_distance import braking_distance_m
 from coramp.errors import CorampError
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
+from coramp.scenarios.quantities import FASTEST_MPS
 from coramp.scenarios.sections import (
-    FASTEST_MPS,
     Controller,
     DriverPopulation,
     ExplicitArrival,

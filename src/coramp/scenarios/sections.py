@@ -5,10 +5,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from coramp.equations.conflict_risk import GRAVITY_MPS2
+from coramp.scenarios.quantities import Length, Speed
 from coramp.scenarios.vehicle_types import BUILT_IN, VehicleType
 from coramp.vehicles.traits import CAR
 
-FASTEST_MPS = 60.0
 LONGEST_STEP_S = 0.25
 """Up to here SUMO was seen to stay within 5 cm of the plan; the error grows with the square."""
 
@@ -19,7 +19,6 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-Speed = Annotated[float, Field(gt=0.0, le=FASTEST_MPS)]
 SpeedRange = Annotated[tuple[Speed, Speed], Field(strict=False)]
 Flow = Annotated[float, Field(ge=0.0)]
 Headway = Annotated[float, Field(gt=0.0, le=60.0)]
@@ -82,7 +81,7 @@ class Ramp(Stream):
 class Vehicle(Model):
     """All vehicles are cars and alike; an explicit arrival may be longer or shorter."""
 
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = BUILT_IN[CAR]["length_m"]
+    length_m: Length = BUILT_IN[CAR]["length_m"]
 
 
 Vehicles = Annotated[
@@ -179,7 +178,7 @@ class ExplicitArrival(Model):
     stream: Literal["mainline", "ramp"]
     time_s: NotNegative
     speed_mps: Speed
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] | None = None
+    length_m: Length | None = None
     type: str | None = None
     top_speed_mps: Speed | None = None
 

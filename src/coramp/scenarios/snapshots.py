@@ -7,9 +7,11 @@ from pydantic import Field, model_validator
 
 from coramp.equations.safe_distance import safe_distance_m
 from coramp.errors import CorampError
+from coramp.road.streams import STREAMS
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
-from coramp.scenarios.sections import Model, Speed
+from coramp.scenarios.quantities import Length, Speed
+from coramp.scenarios.sections import Model
 from coramp.scenarios.toml_files import beside, read, validated
 
 
@@ -20,7 +22,7 @@ class SnapshotVehicle(Model):
     stream: Literal["mainline", "ramp"]
     station_m: float
     speed_mps: Speed
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] | None = None
+    length_m: Length | None = None
 
 
 class Snapshot(Model):
@@ -103,7 +105,7 @@ def _place_problems(snapshot: Snapshot, scenario: Scenario) -> list[str]:
 
 def _distance_problems(snapshot: Snapshot, scenario: Scenario) -> list[str]:
     safety, problems = scenario.rules().safety, []
-    for stream in ("mainline", "ramp"):
+    for stream in STREAMS:
         lane = [vehicle for vehicle in snapshot.vehicles if vehicle.stream == stream]
         lane.sort(key=lambda vehicle: -vehicle.station_m)
         for front, rear in pairwise(lane):

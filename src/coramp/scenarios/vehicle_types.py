@@ -6,16 +6,16 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from coramp.kinematics.fuel import FUEL_MODELS, HEAVY_DUTY, PASSENGER_CAR, FuelModel
+from coramp.road.streams import STREAMS
+from coramp.scenarios.quantities import Length, Speed
 from coramp.vehicles.traits import CAR, CAR_MASS_KG, Traits
 
 TRUCK = "truck"
-FASTEST_TYPE_MPS = 60.0
 SHARES_SUM_TO = 1e-6
 """By so much may shares differ from 1 in sum."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 SumoClass = Literal["passenger", "delivery", "truck", "trailer", "bus", "coach"]
-TopSpeed = Annotated[float, Field(gt=0.0, le=FASTEST_TYPE_MPS)]
 
 BUILT_IN: dict[str, dict[str, Any]] = {
     CAR: {
@@ -61,12 +61,12 @@ class VehicleType(BaseModel):
     share: Share | None = None
     mainline_share: Share | None = None
     ramp_share: Share | None = None
-    length_m: Annotated[float, Field(gt=0.0, le=40.0)] = BUILT_IN[CAR]["length_m"]
+    length_m: Length = BUILT_IN[CAR]["length_m"]
     mass_kg: Annotated[float, Field(ge=50.0, le=200000.0)] = BUILT_IN[CAR]["mass_kg"]
     acceleration_mps2: Annotated[float, Field(ge=0.1, le=10.0)] | None = None
     power_wpkg: Annotated[float, Field(ge=0.5, le=1000.0)] | None = None
     braking_mps2: Annotated[float, Field(ge=0.5, le=10.0)] | None = None
-    top_speed_mps: Annotated[tuple[TopSpeed, TopSpeed], Field(strict=False)] | None = None
+    top_speed_mps: Annotated[tuple[Speed, Speed], Field(strict=False)] | None = None
     time_gap_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     positioning_error_m: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
     clock_error_s: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
@@ -130,7 +130,7 @@ def share_problems(types: tuple[VehicleType, ...]) -> list[str]:
         for k, name in enumerate(names)
         if name in names[:k]
     ]
-    for on_ramp, stream in enumerate(("mainline", "ramp")):
+    for on_ramp, stream in enumerate(STREAMS):
         total = sum(kind.share_of(bool(on_ramp)) for kind in types)
         if abs(total - 1.0) > SHARES_SUM_TO:
             told = ", ".join(f"{kind.name} {kind.share_of(bool(on_ramp)):g}" for kind in types)

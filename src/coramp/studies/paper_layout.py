@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import polars as pl
 
+from coramp.road.streams import STREAMS
 from coramp.studies.paper_results import FUEL_L, MAINLINE_DELAY_S, RAMP_DELAY_S, Flows, Printed
 from coramp.studies.statistics import Estimate, estimate, improvement_rate
 from coramp.studies.tables import Table, number, with_interval
@@ -188,7 +189,7 @@ def speed_table(good: pl.DataFrame) -> Table:
     rows = []
     for flows in MAINLINE_DELAY_S:
         row = [f"{flows[0]} + {flows[1]}"]
-        for stream in ("mainline", "ramp"):
+        for stream in STREAMS:
             means = lookup(good, f"{stream}_speed_mps")
             spreads = lookup(good, f"{stream}_speed_std_mps")
             row += [

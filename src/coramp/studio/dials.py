@@ -8,6 +8,7 @@ from typing import Any
 from coramp.equations.gaps import least_acceleration_mps2
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
+from coramp.road.streams import STREAMS
 from coramp.runs.running import RunSpec, make_spec
 from coramp.scenarios.checks import decision_station_range_m
 from coramp.scenarios.loading import load_scenario
@@ -166,7 +167,7 @@ def _following(scenario: Scenario, changed: Mapping[str, float]) -> Iterator[tup
     Entry speeds and limits keep their ratio to the speed of their stream. The decision station and
     the ordinary acceleration move no further than the changed road asks (Eq. 22).
     """
-    for stream in ("mainline", "ramp"):
+    for stream in STREAMS:
         speed_mps = changed.get(f"{stream}.speed_mps")
         if speed_mps is None:
             continue

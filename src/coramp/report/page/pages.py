@@ -9,6 +9,7 @@ from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
+from coramp.road.streams import STREAMS
 from coramp.runs.running import broken_promises
 from coramp.studies.metric_labels import LABELS, RUNG_COLUMNS, in_unit, label_of, typeset
 from coramp.studies.speed_unit import MPS, SpeedUnit
@@ -170,7 +171,7 @@ def _difference(runs: Sequence[RunRecords]) -> list[str]:
         return []
     one, other = runs[0].summary, runs[1].summary
     parts = []
-    for stream in ("mainline", "ramp"):
+    for stream in STREAMS:
         first, second = one[f"{stream}_delay_s"], other[f"{stream}_delay_s"]
         if first is not None and second is not None:
             word = "less" if first <= second else "more"
