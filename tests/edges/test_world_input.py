@@ -121,8 +121,8 @@ SHORT = {"traffic.automated_share": 0.5, "ramp.acceleration_lane_m": 110.0}
 
 
 def test_a_lag_that_no_plan_can_absorb_is_refused_with_the_largest_that_can_be():
-    """On 110 m: (107 - 16^2 / 3.8) / 16 - 0.3 = 2.177 s, by hand."""
-    for dead_time_s, lag_s in ((1.1, 1.08), (1.08, 1.1), (2.0, 2.0)):
+    """On 110 m: (107 - 16^2 / 3.3) / 16 - 0.3 = 1.539 s, by hand."""
+    for dead_time_s, lag_s in ((0.8, 0.75), (0.75, 0.8), (2.0, 2.0)):
         key = "dead_time_s" if dead_time_s > lag_s else "lag_s"
         late = {"actuators.dead_time_s": dead_time_s, "actuators.lag_s": lag_s}
         with pytest.raises(CorampError) as refused:
@@ -131,9 +131,9 @@ def test_a_lag_that_no_plan_can_absorb_is_refused_with_the_largest_that_can_be()
         assert line == (
             f"actuators.{key}: who reacts {dead_time_s + lag_s:g} s late and passes the nose at "
             "ramp.speed_mps 16 cannot stop before ramp.acceleration_lane_m 110 ends; allowed are "
-            "dead_time_s and lag_s of up to 2.17 s together"
+            "dead_time_s and lag_s of up to 1.53 s together"
         )
-    for late in ({"actuators.lag_s": 2.0}, {"actuators.dead_time_s": 1.0, "actuators.lag_s": 1.17}):
+    for late in ({"actuators.lag_s": 1.5}, {"actuators.dead_time_s": 0.8, "actuators.lag_s": 0.73}):
         make_spec("paper", "mixed-slots", overrides={**SHORT, **late})
 
 

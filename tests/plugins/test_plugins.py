@@ -246,7 +246,8 @@ class Writing:
         if self.part == "packed_rules":
             view.packed_rules[0] += 1.0
         else:
-            getattr(view, self.part).pieces[:, 1] += 0.25
+            with np.errstate(invalid="ignore"):  # places that nobody uses hold any bits at all
+                getattr(view, self.part).pieces[:, 1] += 0.25
         return MainlinePriority().decide(view, memory)
 
 
