@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coramp.mixed.laws import FollowingLaw, SafetyLaw, SequenceLaw
+from coramp.mixed.laws import CourtesyLaws, FollowingLaw, OnBoardLaws, SafetyLaw, SequenceLaw
 from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers
 
@@ -52,6 +52,9 @@ SAFETY = SafetyLaw(
     gentle_mps2=0.6,
     gentle_at_end_mps2=5.0,
 )
+
+ON_BOARD = OnBoardLaws(GAPS, FOLLOWING, SAFETY, ROAD, period_s=0.2)
+COURTESY = CourtesyLaws(GAPS, SEQUENCE, FOLLOWING, ROAD, period_s=0.2)
 
 
 def users_of(rows):

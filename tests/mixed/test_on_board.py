@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from coramp.mixed.laws import FollowingLaw, SafetyLaw
+from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
 from coramp.mixed.on_board import (
     distance_speed_mps,
     driven_mps2,
@@ -16,7 +16,7 @@ from coramp.mixed.on_board import (
 )
 from coramp.worlds.sumo.mixed_setup import LANE_END_M
 from tests.mathematics import close
-from tests.mixed.roads import FOLLOWING, GAPS, ROAD, SAFETY, at_once, users_of
+from tests.mixed.roads import GAPS, ON_BOARD, ROAD, SAFETY, at_once, users_of
 
 OURS = SafetyLaw()
 PIECE_S = 0.05
@@ -58,9 +58,8 @@ def accel_of(own, leaders, braking_mps2, told_mps2, period_s, *, changes):
     told = np.full(len(rows), told_mps2)
     law = OURS._replace(lane_end_m=1e6, reaction_s=max(OURS.reaction_s, period_s))
     around = neighbours_of(users)
-    return driven_mps2(
-        users, around, at_once(users), told, changing, GAPS, FollowingLaw(), law, ROAD, period_s
-    )[0]
+    laws = OnBoardLaws(GAPS, FollowingLaw(), law, ROAD, period_s)
+    return driven_mps2(users, around, at_once(users), told, changing, laws)[0]
 
 
 def smallest_gap_m(own_mps, braking_mps2, leaders, motions, told_mps2, period_s):
@@ -149,18 +148,9 @@ def test_who_does_not_merge_stands_before_the_lane_ends(station_m, speed_mps, pe
     for _ in range(round(120.0 / period_s)):
         users = users_of([(station_m, speed_mps, False, True)])
         told, changes = np.array([max(told_mps2, 0.0)]), np.zeros(1, np.bool_)
-        accel = driven_mps2(
-            users,
-            neighbours_of(users),
-            at_once(users),
-            told,
-            changes,
-            GAPS,
-            FOLLOWING,
-            SAFETY,
-            ROAD,
-            period_s,
-        )[0]
+        laws = ON_BOARD._replace(period_s=period_s)
+        around, ahead = neighbours_of(users), at_once(users)
+        accel = driven_mps2(users, around, ahead, told, changes, laws)[0]
         new_mps = speed_mps + accel * period_s
         assert new_mps >= -1e-9
         station_m += 0.5 * (speed_mps + new_mps) * period_s
@@ -191,7 +181,7 @@ def may_change(users, slowest_mps=None):
     if slowest_mps is None:
         slowest_mps = users.speed_mps[0]
     around, ahead = neighbours_of(users), at_once(users)
-    return may_change_lane(users, 0, around, ahead, slowest_mps, GAPS, FOLLOWING, SAFETY)
+    return may_change_lane(users, 0, around, ahead, slowest_mps, ON_BOARD)
 
 
 def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
@@ -233,18 +223,7 @@ def test_nobody_changes_lanes_before_the_nose_or_from_the_mainline():
 def test_drivers_are_given_nothing_to_do():
     users = users_of([(100.0, 20.0, True, False), (94.0, 20.0, True, False)])
     told, changes = np.full(2, -3.0), np.zeros(2, np.bool_)
-    accel = driven_mps2(
-        users,
-        neighbours_of(users),
-        at_once(users),
-        told,
-        changes,
-        GAPS,
-        FOLLOWING,
-        SAFETY,
-        ROAD,
-        0.2,
-    )
+    accel = driven_mps2(users, neighbours_of(users), at_once(users), told, changes, ON_BOARD)
     assert accel.tolist() == [0.0, 0.0]
 
 

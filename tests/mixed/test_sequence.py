@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from coramp.mixed.courtesy import courtesy_mps2
 from coramp.mixed.on_board import neighbours_of
 from coramp.mixed.sequence import sequence_of, virtual_station
-from coramp.mixed.situation import Situation
+from coramp.mixed.situation import MixedSituation
 from coramp.mixed.users import gap_for_m, gap_m
 from coramp.strategies.mixed_slots import MixedSlots
 from tests.mathematics import close
-from tests.mixed.roads import FOLLOWING, GAPS, ROAD, SEQUENCE, users_of
+from tests.mixed.roads import COURTESY, FOLLOWING, GAPS, ROAD, SEQUENCE, users_of
 
 NEW = -2
 
@@ -47,7 +47,7 @@ def test_the_order_holds_everybody_once_and_each_stream_in_its_order(users, data
     chosen = [data.draw(st.sampled_from(numbers)) for _ in users.number]
     before = np.array(chosen, np.int64)
     kept, kept_before = copied(users), before.copy()
-    order, behind = sequence_of(users, before, GAPS, SEQUENCE, FOLLOWING, ROAD)
+    order, behind = sequence_of(users, before, COURTESY)
     assert sorted(order.place.tolist()) == list(range(len(users.number)))
     assert np.isfinite(order.station_m).all()
     assert np.isfinite(order.merge_in_s).all()
@@ -70,7 +70,7 @@ def test_the_order_holds_everybody_once_and_each_stream_in_its_order(users, data
 @settings(max_examples=100, deadline=None)
 @given(some_users(), st.sampled_from(["least-cost", "mainline-first", "ramp-first"]))
 def test_the_strategy_answers_any_situation_and_twice_the_same(users, order):
-    situation = Situation(10.0, 0.2, users, neighbours_of(users), GAPS, ROAD)
+    situation = MixedSituation(10.0, 0.2, users, neighbours_of(users), GAPS, ROAD)
     kept = copied(users)
     strategy = MixedSlots(order=order)
     first, second = strategy.steer(situation, ()), strategy.steer(situation, ())
@@ -127,7 +127,7 @@ def test_which_gap_is_kept_behind_and_left_for_whom():
 def ordered(rows, before=NEW, law=SEQUENCE):
     users = users_of(rows)
     known = np.full(len(rows), before)
-    return users, *sequence_of(users, known, GAPS, law, FOLLOWING, ROAD)
+    return users, *sequence_of(users, known, COURTESY._replace(sequence=law))
 
 
 def test_the_place_that_costs_least():
@@ -177,7 +177,7 @@ def test_a_place_that_it_has_costs_less():
 def room(rows, period_s=0.2):
     users, order, _ = ordered(rows)
     leaders = neighbours_of(users).leader
-    return courtesy_mps2(users, order, leaders, GAPS, SEQUENCE, FOLLOWING, ROAD, period_s)
+    return courtesy_mps2(users, order, leaders, COURTESY._replace(period_s=period_s))
 
 
 def test_how_hard_one_brakes_for_a_vehicle_that_is_to_merge():

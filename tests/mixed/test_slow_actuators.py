@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from coramp.mixed.laws import FollowingLaw, SafetyLaw
+from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
 from coramp.mixed.on_board import Ahead, driven_mps2, may_change_lane, neighbours_of
 from coramp.scenarios.world_sections import Actuators
 from coramp.worlds.faults.actuators import SlowActuators
@@ -108,11 +108,7 @@ class Slow:
             self.ahead(2),
             np.full(2, told_mps2),
             np.zeros(2, np.bool_),
-            GAPS,
-            FollowingLaw(),
-            self.law,
-            ROAD,
-            self.period_s,
+            OnBoardLaws(GAPS, FollowingLaw(), self.law, ROAD, self.period_s),
         )[0]
 
     def step(self, command_mps2):
@@ -178,7 +174,6 @@ def test_nobody_merges_ahead_of_one_that_could_only_stop_beyond():
     users = users_of(rows)
     for way_m, allowed in ((0.5, True), (6.0, False)):
         ahead = Ahead(np.array([0.0, way_m]), np.array([0.0, 0.3]), 2.0)
-        found = may_change_lane(
-            users, 0, neighbours_of(users), ahead, 0.0, GAPS, FollowingLaw(), OURS
-        )
+        laws = OnBoardLaws(GAPS, FollowingLaw(), OURS, ROAD, period_s=0.2)
+        found = may_change_lane(users, 0, neighbours_of(users), ahead, 0.0, laws)
         assert found is allowed

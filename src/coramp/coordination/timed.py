@@ -4,7 +4,7 @@ import time
 from statistics import quantiles
 from typing import Any
 
-from coramp.mixed.situation import Places, Situation, Steering
+from coramp.mixed.situation import MixedSituation, Places, Steering
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -39,7 +39,7 @@ class Timed:
         """The time (s) between two decisions of a strategy for mixed traffic."""
         return float(getattr(self._strategy, "decision_s"))  # noqa: B009 - not all have it
 
-    def steer(self, situation: Situation, places: Places) -> Steering:
+    def steer(self, situation: MixedSituation, places: Places) -> Steering:
         """Returns what a strategy for mixed traffic answers."""
         started = time.perf_counter()
         try:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
-from coramp.mixed.laws import FollowingLaw, SequenceLaw
+from coramp.mixed.laws import CourtesyLaws, FollowingLaw, SequenceLaw
 from coramp.mixed.sequence import Sequence
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers, gap_for_m, gap_m
 
@@ -15,17 +15,14 @@ def courtesy_mps2(
     users: RoadUsers,
     order: Sequence,
     leaders: IntArray,
-    gaps: Gaps,
-    law: SequenceLaw,
-    following: FollowingLaw,
-    road: MixedRoad,
-    period_s: float,
+    laws: CourtesyLaws,
 ) -> FloatArray:
     """Returns the largest acceleration (m/s2) of each vehicle that leaves room, infinity for most.
 
     Bound are automated vehicles behind one that is yet to merge, and those that are themselves to
     merge behind one on the mainline. ``leaders`` are those in their own lanes.
     """
+    following, period_s = laws.following, laws.period_s
     most_mps2 = np.full(len(users.number), math.inf)
     for k in range(1, len(order.place)):
         own, front = order.place[k], order.place[k - 1]
@@ -33,11 +30,11 @@ def courtesy_mps2(
             continue
         if not (order.virtual[k] or order.virtual[k - 1]):
             continue
-        wanted_mps2 = _wanted_mps2(users, order, k, gaps, following)
+        wanted_mps2 = _wanted_mps2(users, order, k, laws.gaps, following)
         merge_in_s = order.merge_in_s[own if order.virtual[k] else front]
         share = following.early_share if merge_in_s > following.early_s else 1.0
         wanted_mps2 = max(wanted_mps2, -following.courtesy_mps2 * share)
-        floor_mps = _floor_mps(users, order, k, law, road)
+        floor_mps = _floor_mps(users, order, k, laws.sequence, laws.road)
         speed_mps = users.speed_mps[own]
         if wanted_mps2 < 0.0 and speed_mps + wanted_mps2 * period_s < floor_mps:
             wanted_mps2 = min(0.0, max(wanted_mps2, (floor_mps - speed_mps) / period_s))

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from coramp.mixed.users import Gaps, MixedRoad
+
 
 class FollowingLaw(NamedTuple):
     """How an automated vehicle follows: a = k_g (gap - s_0 - T v) + k_v (v_leader - v).
@@ -78,3 +80,23 @@ class SafetyLaw(NamedTuple):
             stop_mps2=min(self.stop_mps2, most_braking_mps2),
             driver_mps2=min(self.driver_mps2, most_braking_mps2),
         )
+
+
+class OnBoardLaws(NamedTuple):
+    """All that a vehicle drives by on board, once each ``period_s``."""
+
+    gaps: Gaps
+    following: FollowingLaw
+    safety: SafetyLaw
+    road: MixedRoad
+    period_s: float
+
+
+class CourtesyLaws(NamedTuple):
+    """All that places on the ramp, and the room that is left there, follow from."""
+
+    gaps: Gaps
+    sequence: SequenceLaw
+    following: FollowingLaw
+    road: MixedRoad
+    period_s: float

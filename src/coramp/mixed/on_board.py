@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.mixed.laws import FollowingLaw, SafetyLaw
-from coramp.mixed.users import NOBODY, Gaps, MixedRoad, RoadUsers, gap_m, in_order
+from coramp.mixed.laws import OnBoardLaws, SafetyLaw
+from coramp.mixed.users import NOBODY, RoadUsers, gap_m, in_order
 
 TO_CRUISE_S = 1.0
 CRUISE_BRAKING_MPS2 = 2.0
@@ -95,9 +95,7 @@ def may_change_lane(
     around: Neighbours,
     ahead: Ahead,
     slowest_mps: float,
-    gaps: Gaps,
-    following: FollowingLaw,
-    law: SafetyLaw,
+    laws: OnBoardLaws,
 ) -> bool:
     """Returns whether a lane change of a vehicle on the acceleration lane keeps all distances.
 
@@ -109,33 +107,49 @@ def may_change_lane(
     if users.on_mainline[own] or users.station_m[own] < READY_M:
         return False
     front, rear = around.front[own], around.rear[own]
-    share = max(0.0, users.station_m[own] / law.lane_end_m)
-    gentle_mps2 = law.gentle_mps2 + law.gentle_at_end_mps2 * share * share
-    if front >= 0:
-        free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
-        keeps_mps = _keeps_mps(users, own, front, ahead, law)
-        if free_m < TOUCHING_M or keeps_mps < ahead.speed_mps[own]:
-            return False
-        if keeps_mps == 0.0 and free_m - ahead.way_m[own] < TOUCHING_M:
-            return False
-        if _follows_mps2(users, own, front, ahead, gaps, following) < -gentle_mps2:
-            return False
+    if front >= 0 and not _may_be_behind(users, own, front, own, ahead, laws):
+        return False
     if rear < 0:
         return True
-    free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
-    rear_mps = users.speed_mps[rear]
     if not users.automated[rear]:
-        squares = rear_mps**2 - slowest_mps**2
-        braking_m = max(squares / (2.0 * law.driver_mps2), squares / (2.0 * law.driver_dry_mps2))
-        needs_m = gap_m(False, True, rear_mps, gaps) + braking_m - law.relax_m
-        return bool(free_m >= max(TOUCHING_M, needs_m))
-    keeps_mps = _keeps_mps(users, rear, own, ahead, law)
+        return _leaves_driver_room(users, own, rear, slowest_mps, laws)
+    return _may_be_behind(users, rear, own, own, ahead, laws)
+
+
+@kernel
+def _may_be_behind(
+    users: RoadUsers, rear: int, front: int, changes: int, ahead: Ahead, laws: OnBoardLaws
+) -> bool:
+    """Whether an automated vehicle keeps its distance behind another once one of them ``changes``.
+
+    It follows gently then. One that does not change lanes itself may have to brake before it
+    reacts.
+    """
+    safety = laws.safety
+    free_m = users.station_m[front] - users.length_m[front] - users.station_m[rear]
+    keeps_mps = _keeps_mps(users, rear, front, ahead, safety)
     spare_mps = keeps_mps - ahead.speed_mps[rear]
-    if free_m < TOUCHING_M or spare_mps < -law.braking_mps2 / REAR_BRAKES_SHARE * law.reaction_s:
+    brakes_mps2 = 0.0 if rear == changes else safety.braking_mps2 / REAR_BRAKES_SHARE
+    if free_m < TOUCHING_M or spare_mps < -brakes_mps2 * safety.reaction_s:
         return False
     if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < TOUCHING_M:
         return False  # it would only come to a stand beyond
-    return bool(_follows_mps2(users, rear, own, ahead, gaps, following) >= -gentle_mps2)
+    share = max(0.0, users.station_m[changes] / safety.lane_end_m)
+    gentle_mps2 = safety.gentle_mps2 + safety.gentle_at_end_mps2 * share * share
+    return bool(_follows_mps2(users, rear, front, ahead, laws) >= -gentle_mps2)
+
+
+@kernel
+def _leaves_driver_room(
+    users: RoadUsers, own: int, rear: int, slowest_mps: float, laws: OnBoardLaws
+) -> bool:
+    """Whether a driver behind has what he keeps, and what braking in comfort takes."""
+    safety, rear_mps = laws.safety, users.speed_mps[rear]
+    squares = rear_mps**2 - slowest_mps**2
+    braking_m = max(squares / (2.0 * safety.driver_mps2), squares / (2.0 * safety.driver_dry_mps2))
+    needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - safety.relax_m
+    free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
+    return bool(free_m >= max(TOUCHING_M, needs_m))
 
 
 @kernel
@@ -155,9 +169,7 @@ def _keeps_mps(users: RoadUsers, own: int, front: int, ahead: Ahead, law: Safety
 
 
 @kernel
-def _follows_mps2(
-    users: RoadUsers, own: int, front: int, ahead: Ahead, gaps: Gaps, law: FollowingLaw
-) -> float:
+def _follows_mps2(users: RoadUsers, own: int, front: int, ahead: Ahead, laws: OnBoardLaws) -> float:
     """The linear law behind a vehicle in the same lane, or one that is about to be in it.
 
     It holds for when a command acts; the leader is taken to keep its speed until then.
@@ -165,24 +177,17 @@ def _follows_mps2(
     speed_mps, front_mps = ahead.speed_mps[own], users.speed_mps[front]
     free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
     free_m += front_mps * ahead.delay_s - ahead.way_m[own]
-    error_m = free_m - gap_m(True, users.automated[front], speed_mps, gaps)
+    error_m = free_m - gap_m(True, users.automated[front], speed_mps, laws.gaps)
+    law = laws.following
     return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * (front_mps - speed_mps))
 
 
 @kernel
-def _behind_mps2(
-    users: RoadUsers,
-    own: int,
-    front: int,
-    ahead: Ahead,
-    gaps: Gaps,
-    following: FollowingLaw,
-    law: SafetyLaw,
-) -> float:
+def _behind_mps2(users: RoadUsers, own: int, front: int, ahead: Ahead, laws: OnBoardLaws) -> float:
     """The largest acceleration (m/s2) behind a vehicle: by the linear law, and never too near."""
-    wanted_mps2 = _follows_mps2(users, own, front, ahead, gaps, following)
-    keeps_mps = _keeps_mps(users, own, front, ahead, law)
-    safe_mps2 = (keeps_mps - ahead.speed_mps[own]) / law.reaction_s
+    wanted_mps2 = _follows_mps2(users, own, front, ahead, laws)
+    keeps_mps = _keeps_mps(users, own, front, ahead, laws.safety)
+    safe_mps2 = (keeps_mps - ahead.speed_mps[own]) / laws.safety.reaction_s
     return float(min(max(-users.braking_mps2[own], wanted_mps2), safe_mps2))
 
 
@@ -193,11 +198,7 @@ def driven_mps2(
     ahead: Ahead,
     told_mps2: FloatArray,
     changes: BoolArray,
-    gaps: Gaps,
-    following: FollowingLaw,
-    law: SafetyLaw,
-    road: MixedRoad,
-    period_s: float,
+    laws: OnBoardLaws,
 ) -> FloatArray:
     """Returns the acceleration (m/s2) of each automated vehicle for one period, 0 of others.
 
@@ -208,37 +209,30 @@ def driven_mps2(
     for own in range(len(users.number)):
         if not users.automated[own]:
             continue
-        accel = min(told_mps2[own], _alone_mps2(users, own, ahead, following, law, road, period_s))
+        accel = min(told_mps2[own], _alone_mps2(users, own, ahead, laws))
         if around.leader[own] >= 0:
             leader = around.leader[own]
-            accel = min(accel, _behind_mps2(users, own, leader, ahead, gaps, following, law))
+            accel = min(accel, _behind_mps2(users, own, leader, ahead, laws))
         if changes[own] and around.front[own] >= 0:
             front = around.front[own]
-            accel = min(accel, _behind_mps2(users, own, front, ahead, gaps, following, law))
+            accel = min(accel, _behind_mps2(users, own, front, ahead, laws))
         accel_mps2[own] = accel
     for own in range(len(users.number)):
         rear = around.rear[own]
         if changes[own] and rear >= 0 and users.automated[rear]:
-            behind_mps2 = _behind_mps2(users, rear, own, ahead, gaps, following, law)
+            behind_mps2 = _behind_mps2(users, rear, own, ahead, laws)
             accel_mps2[rear] = min(accel_mps2[rear], behind_mps2)
     for own in range(len(users.number)):
-        accel = max(-law.hardest_mps2, accel_mps2[own])
-        stops_mps2 = -ahead.speed_mps[own] / period_s
+        accel = max(-laws.safety.hardest_mps2, accel_mps2[own])
+        stops_mps2 = -ahead.speed_mps[own] / laws.period_s
         accel_mps2[own] = max(stops_mps2, accel) if users.automated[own] else 0.0
     return accel_mps2
 
 
 @kernel
-def _alone_mps2(
-    users: RoadUsers,
-    own: int,
-    ahead: Ahead,
-    following: FollowingLaw,
-    law: SafetyLaw,
-    road: MixedRoad,
-    period_s: float,
-) -> float:
+def _alone_mps2(users: RoadUsers, own: int, ahead: Ahead, laws: OnBoardLaws) -> float:
     """Towards the speed that it wishes, and to a stop before the acceleration lane ends."""
+    following, safety, road, period_s = laws.following, laws.safety, laws.road, laws.period_s
     station_m, speed_mps = users.station_m[own] + ahead.way_m[own], ahead.speed_mps[own]
     able_mps2 = min(users.acceleration_mps2[own], users.power_wpkg[own] / max(speed_mps, 0.1))
     if users.on_mainline[own]:
@@ -251,8 +245,8 @@ def _alone_mps2(
     accel = min(up_mps2, max(-CRUISE_BRAKING_MPS2, (wish_mps - speed_mps) / TO_CRUISE_S))
     accel = min(accel, (users.cruise_mps[own] - speed_mps) / period_s)
     if not users.on_mainline[own]:
-        left_m = max(0.0, law.lane_end_m - station_m)
-        stops_mps = math.sqrt(2.0 * law.stop_mps2 * left_m)
+        left_m = max(0.0, safety.lane_end_m - station_m)
+        stops_mps = math.sqrt(2.0 * safety.stop_mps2 * left_m)
         accel = min(accel, (stops_mps - speed_mps) / period_s)
         if station_m < 0.0:
             accel = min(accel, (road.ramp_limit_mps - speed_mps) / period_s)

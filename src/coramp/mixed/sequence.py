@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.mixed.laws import FollowingLaw, SequenceLaw
-from coramp.mixed.users import NOBODY, Gaps, MixedRoad, RoadUsers, gap_for_m, gap_m, in_order
+from coramp.mixed.laws import CourtesyLaws, FollowingLaw
+from coramp.mixed.users import NOBODY, MixedRoad, RoadUsers, gap_for_m, gap_m, in_order
 
 SLOWEST_LANE_MPS = 3.0
 """A lane that stands still has no virtual stations; they are those of a lane that crawls."""
@@ -40,10 +40,7 @@ class Sequence(NamedTuple):
 def sequence_of(
     users: RoadUsers,
     before: IntArray,
-    gaps: Gaps,
-    law: SequenceLaw,
-    following: FollowingLaw,
-    road: MixedRoad,
+    laws: CourtesyLaws,
 ) -> tuple[Sequence, IntArray]:
     """Returns the order, and the number of whom each ramp vehicle is behind (-1: of nobody).
 
@@ -61,15 +58,15 @@ def sequence_of(
         np.zeros(size, np.bool_),
     )
     place[:count], station_m[:count] = mainline, users.station_m[mainline]
-    lane_mps = np.full(len(users.number), road.mainline_speed_mps)
+    lane_mps = np.full(len(users.number), laws.road.mainline_speed_mps)
     merge_in_s, behind = np.zeros(len(users.number)), np.full(len(users.number), NOBODY)
     for own in ramp:
-        lane_mps[own] = _lane_speed_mps(users, mainline, users.station_m[own], law, road)
+        lane_mps[own] = _lane_speed_mps(users, mainline, users.station_m[own], laws)
         own_m, merge_in_s[own] = virtual_station(
-            users.station_m[own], users.speed_mps[own], lane_mps[own], following, road
+            users.station_m[own], users.speed_mps[own], lane_mps[own], laws.following, laws.road
         )
         now = Sequence(place[:count], station_m[:count], virtual[:count], lane_mps, merge_in_s)
-        last = _cheapest(users, now, own, own_m, last + 1, before[own], gaps, law)
+        last = _cheapest(users, now, own, own_m, last + 1, before[own], laws)
         behind[own] = users.number[place[last - 1]] if last > 0 else NOBODY
         for k in range(count, last, -1):
             place[k], station_m[k], virtual[k] = place[k - 1], station_m[k - 1], virtual[k - 1]
@@ -79,10 +76,9 @@ def sequence_of(
 
 
 @kernel
-def _lane_speed_mps(
-    users: RoadUsers, mainline: IntArray, at_m: float, law: SequenceLaw, road: MixedRoad
-) -> float:
+def _lane_speed_mps(users: RoadUsers, mainline: IntArray, at_m: float, laws: CourtesyLaws) -> float:
     """The mean speed of the mainline around a station, v0 where it is empty."""
+    law, road = laws.sequence, laws.road
     total_mps, count = 0.0, 0
     for i in mainline:
         if at_m - law.behind_m < users.station_m[i] < at_m + law.ahead_m:
@@ -127,10 +123,10 @@ def _cheapest(
     own_m: float,
     first: int,
     before: int,
-    gaps: Gaps,
-    law: SequenceLaw,
+    laws: CourtesyLaws,
 ) -> int:
     """The place in the order that costs least; the vehicle at it and those behind fall back."""
+    gaps, law = laws.gaps, laws.sequence
     best, least = len(now.place), math.inf
     lane_mps, automated = now.lane_mps[own], users.automated[own]
     for k in range(first, len(now.place) + 1):
@@ -143,7 +139,7 @@ def _cheapest(
                 keeps_m = gap_m(True, users.automated[front], lane_mps, gaps)
             there_m = min(own_m, now.station_m[k - 1] - users.length_m[front] - keeps_m)
         cost = law.own_weight * (own_m - there_m)
-        cost += _fall_back(users, now, own, there_m, k, gaps, law)
+        cost += _fall_back(users, now, own, there_m, k, laws)
         if leader == before:
             cost -= law.hysteresis_m
         if cost < least - 1e-9:
@@ -160,12 +156,12 @@ def _fall_back(
     own: int,
     there_m: float,
     first: int,
-    gaps: Gaps,
-    law: SequenceLaw,
+    laws: CourtesyLaws,
 ) -> float:
     """What the vehicles behind fall back (weighted m) if one merges at ``there_m``."""
     if first >= len(now.place):
         return 0.0
+    gaps, law = laws.gaps, laws.sequence
     speed_mps, rear = now.lane_mps[own], now.place[first]
     leaves_m = gap_for_m(users.automated[rear], users.automated[own], speed_mps, gaps)
     carry_m = now.station_m[first] - (there_m - users.length_m[own] - leaves_m)

@@ -10,7 +10,7 @@ Places = tuple[tuple[int, int], ...]
 """Pairs of a ramp vehicle's number and the number of whom it is to merge behind."""
 
 
-class Situation(NamedTuple):
+class MixedSituation(NamedTuple):
     """Who is known to be on the road at ``time_s``; the next command comes ``period_s`` later."""
 
     time_s: float
@@ -43,6 +43,6 @@ class MixedStrategy(Protocol):
         """The time (s) between two decisions."""
         ...
 
-    def steer(self, situation: Situation, places: Places) -> Steering:
+    def steer(self, situation: MixedSituation, places: Places) -> Steering:
         """Returns bounds for all automated vehicles; ``places`` are those of its last answer."""
         ...

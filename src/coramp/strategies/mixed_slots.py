@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from coramp.mixed.courtesy import courtesy_mps2
-from coramp.mixed.laws import FollowingLaw, SequenceLaw
+from coramp.mixed.laws import CourtesyLaws, FollowingLaw, SequenceLaw
 from coramp.mixed.sequence import sequence_of
-from coramp.mixed.situation import Places, Situation, Steering
+from coramp.mixed.situation import MixedSituation, Places, Steering
 from coramp.strategies.base import Decision, EntryPolicy, Memory, View
 from coramp.strategies.parameters import choice, parameter
 from coramp.strategies.slots import Slots
@@ -52,24 +52,15 @@ class MixedSlots:
         order = "first-come" if self.order == "least-cost" else self.order
         return Slots(order=order)
 
-    def steer(self, situation: Situation, places: Places) -> Steering:
+    def steer(self, situation: MixedSituation, places: Places) -> Steering:
         """Returns how much each automated vehicle may speed up, and where merges are asked for."""
-        users, following = situation.users, FollowingLaw()
-        known = dict(places)
+        users, known = situation.users, dict(places)
+        laws = CourtesyLaws(
+            situation.gaps, self._law, FollowingLaw(), situation.road, situation.period_s
+        )
         before = np.array([known.get(number, UNKNOWN) for number in users.number.tolist()])
-        order, behind = sequence_of(
-            users, before, situation.gaps, self._law, following, situation.road
-        )
-        most_mps2 = courtesy_mps2(
-            users,
-            order,
-            situation.around.leader,
-            situation.gaps,
-            self._law,
-            following,
-            situation.road,
-            situation.period_s,
-        )
+        order, behind = sequence_of(users, before, laws)
+        most_mps2 = courtesy_mps2(users, order, situation.around.leader, laws)
         ramp = ~users.on_mainline
         own = zip(users.number[ramp].tolist(), behind[ramp].tolist(), strict=True)
         return Steering(most_mps2, ramp & users.automated, tuple(own))

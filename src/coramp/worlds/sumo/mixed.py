@@ -8,10 +8,10 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
-from coramp.mixed.laws import FollowingLaw, SafetyLaw
-from coramp.mixed.on_board import Ahead, Neighbours, driven_mps2, may_change_lane, neighbours_of
-from coramp.mixed.situation import MixedStrategy, Places, Situation
-from coramp.mixed.users import Gaps, MixedRoad, RoadUsers
+from coramp.mixed.laws import OnBoardLaws
+from coramp.mixed.on_board import driven_mps2, may_change_lane, neighbours_of
+from coramp.mixed.situation import MixedSituation, MixedStrategy, Places
+from coramp.mixed.users import RoadUsers
 from coramp.records.outcome import Outcome
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import steps_of_period
@@ -26,14 +26,11 @@ from coramp.worlds.sumo.mixed_setup import (
     Able,
     actuators_of,
     automated_types,
-    gaps_of,
-    safety_law_of,
+    laws_of,
 )
 from coramp.worlds.sumo.network import driver_road_plan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.traits import traits_of, with_careless
-
-FOLLOWING = FollowingLaw()
 
 
 def run_mixed(
@@ -49,13 +46,12 @@ def run_mixed(
     plan = driver_road_plan(scenario, drivers)
     step_s = scenario.control.step_s
     period_steps = steps_of_period(strategy.decision_s, step_s)
-    law = safety_law_of(scenario, period_steps * step_s)
     automated = automated_of(scenario, arrivals, seed)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic=False, sampled=True)
         traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
         actuators = actuators_of(scenario, len(arrivals))
-        types = automated_types(scenario, automated, law, actuators.delay_s)
+        types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
         with Session(files.options(), step_s, options.gui) as session:
             plant = MixedPlant(
@@ -68,9 +64,8 @@ def run_mixed(
                 actuators,
             )
             heard = automated | connected_of(scenario, arrivals, seed)
-            speeds = scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps
-            air = Air(scenario, heard, automated, seed)
-            control = Control(strategy, gaps_of(scenario, drivers), law, MixedRoad(*speeds), air)
+            laws = laws_of(scenario, drivers, plant.period_s)
+            control = Control(strategy, laws, Air(scenario, heard, automated, seed))
             careless = Careless(scenario, session, seed)
             control.drive(plant, careless, cap_step_of(scenario))
         files.keep()
@@ -93,11 +88,8 @@ class Control:
     """The strategy for all, what reaches it and whom, and what each vehicle does on board."""
 
     strategy: MixedStrategy
-    gaps: Gaps
-    law: SafetyLaw
-    road: MixedRoad
+    laws: OnBoardLaws
     air: Air
-    following: FollowingLaw = FOLLOWING
     places: Places = field(default=())
 
     def drive(self, plant: MixedPlant, careless: Careless, cap_step: int) -> None:
@@ -122,52 +114,27 @@ class Control:
 
         Only who is ``on_lane``, the acceleration lane, and able to may do that.
         """
-        most_mps2, may_merge = self._told(now_s, plant.period_s, users)
+        most_mps2, may_merge = self._told(now_s, users)
         around, ahead = neighbours_of(users), plant.ahead(users)
         wishes = may_merge & on_lane & users.automated
-        accel_mps2 = self._driven(users, around, ahead, most_mps2, wishes, plant.period_s)
+        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, wishes, self.laws)
         if not wishes.any():
             return accel_mps2, wishes
         slower_mps = users.speed_mps + np.minimum(0.0, accel_mps2) * plant.period_s
         slowest_mps = np.minimum(slower_mps, ahead.speed_mps)
         changes = np.zeros(len(users.number), np.bool_)
         for own in np.flatnonzero(wishes).tolist():
-            changes[own] = may_change_lane(
-                users, own, around, ahead, slowest_mps[own], self.gaps, self.following, self.law
-            )
-        return self._driven(users, around, ahead, most_mps2, changes, plant.period_s), changes
+            changes[own] = may_change_lane(users, own, around, ahead, slowest_mps[own], self.laws)
+        return driven_mps2(users, around, ahead, most_mps2, changes, self.laws), changes
 
-    def _driven(
-        self,
-        users: RoadUsers,
-        around: Neighbours,
-        ahead: Ahead,
-        most_mps2: FloatArray,
-        changes: BoolArray,
-        period_s: float,
-    ) -> FloatArray:
-        """The acceleration of each vehicle for a period, if these change lanes."""
-        return driven_mps2(
-            users,
-            around,
-            ahead,
-            most_mps2,
-            changes,
-            self.gaps,
-            self.following,
-            self.law,
-            self.road,
-            period_s,
-        )
-
-    def _told(
-        self, now_s: float, period_s: float, users: RoadUsers
-    ) -> tuple[FloatArray, BoolArray]:
+    def _told(self, now_s: float, users: RoadUsers) -> tuple[FloatArray, BoolArray]:
         """What vehicles are told: by the strategy, from what it has heard, as far as it arrives."""
-        seen = self.air.heard(now_s, users)
+        laws, seen = self.laws, self.air.heard(now_s, users)
         if len(seen.number):
             steering = self.strategy.steer(
-                Situation(now_s, period_s, seen, neighbours_of(seen), self.gaps, self.road),
+                MixedSituation(
+                    now_s, laws.period_s, seen, neighbours_of(seen), laws.gaps, laws.road
+                ),
                 self.places,
             )
             self.places = steering.places

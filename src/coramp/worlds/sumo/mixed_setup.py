@@ -7,8 +7,8 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
-from coramp.mixed.laws import SafetyLaw
-from coramp.mixed.users import Gaps
+from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
+from coramp.mixed.users import Gaps, MixedRoad
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 from coramp.vehicles.traits import Traits
@@ -59,13 +59,26 @@ def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     )
 
 
+def laws_of(scenario: Scenario, drivers: DriverPopulation, period_s: float) -> OnBoardLaws:
+    """Returns all that automated vehicles drive by, commanded once each period among drivers."""
+    return OnBoardLaws(
+        gaps_of(scenario, drivers),
+        FollowingLaw(),
+        safety_law_of(scenario, period_s),
+        MixedRoad(scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps),
+        period_s,
+    )
+
+
 def automated_types(
-    scenario: Scenario, automated: BoolArray, law: SafetyLaw, delay_s: float
+    scenario: Scenario, automated: BoolArray, period_s: float, delay_s: float
 ) -> Automated:
     """Returns how SUMO's drivers know automated vehicles: by the gaps that these keep at least.
 
-    ``delay_s`` is the time until a command acts. SUMO lets a vehicle enter at such gaps, too.
+    They are commanded once each ``period_s``; ``delay_s`` is the time until a command acts. SUMO
+    lets a vehicle enter at such gaps, too.
     """
+    law = safety_law_of(scenario, period_s)
     return Automated(
         automated,
         max(scenario.safety.time_gap_s, law.reaction_s + delay_s),
