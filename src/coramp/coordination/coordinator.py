@@ -22,23 +22,8 @@ from coramp.coordination.book import ways_of
 from coramp.coordination.commitments import Commitments
 from coramp.coordination.decision_log import DecisionLog
 from coramp.coordination.drivers import DriverRoad, sorted_by_taker
+from coramp.coordination.entrance import Entrance, Listeners
 from coramp.coordination.examination import Examiner, bounds_of
-from coramp.coordination.gate import (
-    DONE,
-    FULL,
-    HEARD,
-    NEVER,
-    REFUSED,
-    WAITS,
-    admit_until,
-    enter,
-    entries_of,
-    gate_for,
-    next_step,
-    open_gate,
-    waiting_at,
-    with_feed,
-)
 from coramp.coordination.ledger import Ledger
 from coramp.coordination.newcomers import Newcomers
 from coramp.coordination.plant import Plant
@@ -96,11 +81,11 @@ class Coordinator:
         self._packed = packed(rules)
         examiner = Examiner(bounds_of(rules), len(feed))
         self._commitments = Commitments(self.ledger, examiner, road)
-        self._feed = feed
         policy = entry_policy_of(strategy)
         self._asks_at_entry, self._holds_newcomers = policy.asked, policy.holds_newcomers
-        slowest_mps = policy.slowest_share * road.mainline_speed_mps
-        self._gate = gate_for(feed, policy.asked, slowest_mps)
+        self._wakes = Wakes()
+        listeners = Listeners(self._wakes, self._log, plant)
+        self._entrance = Entrance(feed, policy, rules, self._commitments, listeners)
         self._fastest_entry_mps = fastest_entry_mps
         self._newcomers = Newcomers(fastest_entry_mps, rules)
         self._plant = plant
@@ -108,8 +93,7 @@ class Coordinator:
         self._detectors: Detectors | None = None
         self._memory: Memory = None
         self._step_s = rules.control.step_s
-        self._wakes = Wakes()
-        self._announced = self._told_of_entries = 0
+        self._told_of_entries = 0
         period_s = period_of(strategy)
         self._period_steps = 0 if period_s is None else steps_of_period(period_s, self._step_s)
 
@@ -118,17 +102,17 @@ class Coordinator:
 
         The clock of a strategy that meters are the readings of the loops.
         """
-        open_gate(self._gate)
+        self._entrance.open()
         if self._period_steps and not is_metered(self._strategy):
             self._wakes.ask(self._period_steps, PERIOD)
 
     def run(self, last_step: int) -> None:
         """Handles every event up to and including ``last_step``."""
         while True:
-            self._admit(min(last_step, self._wakes.next_step))
+            self._entrance.admit(min(last_step, self._wakes.next_step))
             step = self._wakes.next_step
             if step > last_step:
-                if next_step(self._gate) > last_step:
+                if self._entrance.next_step > last_step:
                     return
                 continue
             if self._plant is not None:
@@ -147,56 +131,17 @@ class Coordinator:
         self._decide((), step)
         self._detectors = None
 
-    def _admit(self, last_step: int) -> None:
-        """Lets in whoever is due by ``last_step`` or by the first decision that comes of it."""
-        self._gate = with_feed(self._gate, self._feed)
-        while True:
-            stop = admit_until(
-                self.ledger.book,
-                self._commitments.examiner.record,
-                self._gate,
-                last_step,
-                self._packed,
-                self._commitments.examiner.bounds,
-            )
-            last_step = min(last_step, self._announce_entries())
-            if stop.why == DONE:
-                return
-            if stop.why == FULL:
-                self._commitments.make_room()
-            elif stop.why == REFUSED:
-                self._note_refused_entry(stop.step, stop.code)
-
-    def _announce_entries(self) -> int:
-        """Tells who has entered; returns the first step at which one of them is planned."""
-        new = slice(self._announced, len(self.ledger))
-        self._announced, first_due = new.stop, NEVER
-        self._tell_plant(new)
-        if self._asks_at_entry:
-            for row in range(new.start, new.stop):
-                step = int(self._gate.row_step[row])
-                self._wakes.ask(step, row)
-                first_due = min(first_due, step)
-        for row, due in enumerate(self._gate.row_due_step[new].tolist(), new.start):
-            if due != NEVER:
-                self._wakes.due(due, row)
-                first_due = min(first_due, due)
-        return first_due
-
-    def _tell_plant(self, new: slice) -> None:
-        if self._plant is None:
-            return
-        gate, ledger = self._gate, self.ledger
-        columns = (gate.row_arrival[new].tolist(), gate.row_step[new].tolist())
-        for row, (arrival, step) in enumerate(zip(*columns, strict=True), new.start):
-            self._plant.advance(step)
-            self._plant.enter(row, self._feed[arrival], step)
-            self._plant.follow(row, ledger.trajectory(row), ledger.merge_time_s(row))
-
     def entered(self) -> tuple[IntArray, IntArray]:
         """Returns, a row each, which arrival it is and at which step it entered."""
-        count = len(self.ledger)
-        return self._gate.row_arrival[:count], self._gate.row_step[:count]
+        return self._entrance.entered()
+
+    def waiting(self) -> list[int]:
+        """Returns the requests (by number) that have been heard and have not entered."""
+        return self._entrance.waiting()
+
+    def place(self, number: int, station_m: float, step: int) -> bool:
+        """Puts who asks to enter on the road, from that station; False where that is not safe."""
+        return self._entrance.place(number, station_m, step)
 
     def decide_now(self, step: int) -> None:
         """Has every ramp vehicle on the road planned at ``step``, wherever it is, front first."""
@@ -204,10 +149,6 @@ class Coordinator:
         for row in rows.tolist():
             self._wakes.planned(row)
             self._decide((row,), step)
-
-    def waiting(self) -> list[int]:
-        """Returns the requests (by number) that have been heard and have not entered."""
-        return sorted(set(range(int(self._gate.feed[HEARD]))) - set(self.entered()[0].tolist()))
 
     def _handle_wakes(self, step: int) -> None:
         if self._wakes.tick(step, self._period_steps) and self._has_traffic():
@@ -237,27 +178,6 @@ class Coordinator:
             return
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
-
-    def place(self, number: int, station_m: float, step: int) -> bool:
-        """Puts who asks to enter on the road, from that station; False where that is not safe."""
-        self._commitments.make_room()
-        code = enter(
-            self.ledger.book,
-            self._commitments.examiner.record,
-            self._gate,
-            number,
-            station_m,
-            step,
-            self._rules,
-            self._commitments.examiner.bounds,
-        )
-        if code not in (ACCEPTED, WAITS):
-            self._note_refused_entry(step, code)
-        self._announce_entries()
-        return bool(code == ACCEPTED)
-
-    def _note_refused_entry(self, step: int, code: int) -> None:
-        self._log.note_refused_entry(len(self.ledger), code, step * self._step_s)
 
     def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
         self._commitments.change(row, pieces, merge_time_s, step * self._step_s)
@@ -304,7 +224,6 @@ class Coordinator:
         """Returns what is known at a step."""
         time_s = step * self._step_s
         fleet = self.ledger.fleet
-        entered = range(self._told_of_entries, len(self.ledger))
         return View(
             time_s,
             subjects,
@@ -315,8 +234,8 @@ class Coordinator:
             self._rules,
             self._packed,
             self._detectors,
-            partial(entries_of, self._gate, entered, self._step_s),
-            partial(waiting_at, self._gate, step, self._step_s),
+            self._entrance.entries_since(self._told_of_entries),
+            self._entrance.waiting_at(step),
             self._drivers.seen,
         )
 

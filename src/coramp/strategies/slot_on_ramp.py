@@ -7,6 +7,7 @@ from coramp.equations.gaps import least_acceleration_mps2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.kinematics.trajectory import (
     SPEED,
+    STATION,
     TIME,
     clip_end,
     clip_start,
@@ -19,6 +20,7 @@ from coramp.road.rules import Rules
 from coramp.strategies.situation import Situation
 from coramp.strategies.slot_in_lane import KEEP_M
 from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.merge_state import is_yet_to_merge
 
 SAME_MPS = 1e-6
 LONGEST_WAIT_S = 1e4
@@ -133,3 +135,26 @@ def leave_stop_at(
     least = least_acceleration_mps2(v0, nose_mps, road.last_merge_station_m)
     accel_mps2 = min(max(motion.free_acceleration_mps2, least), motion.ramp_acceleration_mps2)
     return n, accel_mps2, -v0 * nose_s - lag_m(v0, nose_mps, accel_mps2)
+
+
+@kernel
+def leader_regains_s(fleet: Fleet, situation: Situation, rules: Rules) -> float:
+    """Returns when (s) the next vehicle ahead on the ramp is back at the ramp's speed for good.
+
+    When it passes the nose if it does so more slowly; infinity without such a vehicle.
+    """
+    own_m, _ = station_and_speed(committed(fleet, situation.subject), situation.from_s)
+    found, found_m = -1, math.inf
+    for row in fleet.live:
+        if is_yet_to_merge(fleet.merge_time_s[row], situation.from_s):
+            row_m, _ = station_and_speed(committed(fleet, row), situation.from_s)
+            if own_m < row_m < found_m:
+                found, found_m = row, row_m
+    if found < 0:
+        return math.inf
+    ahead = committed(fleet, found)
+    regained_s = ahead[0, TIME]
+    for k in range(len(ahead) - 1):
+        if ahead[k, SPEED] < rules.road.ramp_speed_mps - SAME_MPS and ahead[k, STATION] < 0.0:
+            regained_s = ahead[k + 1, TIME]
+    return float(regained_s)

@@ -37,7 +37,7 @@ from coramp.strategies.situation import (
 )
 from coramp.strategies.slot_in_lane import HALVINGS, KEEP_M, SETBACKS_M
 from coramp.strategies.slot_on_ramp import (
-    SAME_MPS,
+    leader_regains_s,
     leave_stop_at,
     leave_stop_for_slot,
     slow_on_ramp,
@@ -46,7 +46,6 @@ from coramp.strategies.slot_on_ramp import (
 from coramp.strategies.slot_pushing import SETBACKS_M as PUSHING_SETBACKS_M
 from coramp.strategies.slot_pushing import fall_back_behind
 from coramp.vehicles.fleet import ROUNDING_M, Fleet, Proposal, committed, empty_proposal, proposed
-from coramp.vehicles.merge_state import is_yet_to_merge
 from coramp.vehicles.trace import (
     AHEAD_OF_REACH,
     CANNOT_FALL_BACK,
@@ -343,26 +342,3 @@ def merges_safely(
         return False
     unsafe, _ = find_unsafe_pair(fleet, proposal, situation.from_s, rules)
     return bool(unsafe < 0)
-
-
-@kernel
-def leader_regains_s(fleet: Fleet, situation: Situation, rules: Rules) -> float:
-    """Returns when (s) the next vehicle ahead on the ramp is back at the ramp's speed for good.
-
-    When it passes the nose if it does so more slowly; infinity without such a vehicle.
-    """
-    own_m, _ = station_and_speed(committed(fleet, situation.subject), situation.from_s)
-    found, found_m = -1, math.inf
-    for row in fleet.live:
-        if is_yet_to_merge(fleet.merge_time_s[row], situation.from_s):
-            row_m, _ = station_and_speed(committed(fleet, row), situation.from_s)
-            if own_m < row_m < found_m:
-                found, found_m = row, row_m
-    if found < 0:
-        return math.inf
-    ahead = committed(fleet, found)
-    regained_s = ahead[0, TIME]
-    for k in range(len(ahead) - 1):
-        if ahead[k, SPEED] < rules.road.ramp_speed_mps - SAME_MPS and ahead[k, STATION] < 0.0:
-            regained_s = ahead[k + 1, TIME]
-    return float(regained_s)

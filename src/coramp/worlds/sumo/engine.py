@@ -12,7 +12,7 @@ from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.messages.channel import Channel
 from coramp.messages.feed import RequestFeed
-from coramp.messages.log import Told
+from coramp.messages.log import Positions, Told
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.lanes import seen_history
 from coramp.records.outcome import Outcome, Pieces
@@ -89,10 +89,11 @@ def _run_cooperative(
         files.keep()
         collisions = files.collisions()
         samples = files.samples(arrivals) if sampled or keep else None
+    step_s = rules.control.step_s
     outcome = cooperative_outcome(
         coordinator,
         arrivals,
-        rules.control.step_s,
+        step_s,
         end_step,
         np.array([vehicle.largest_error_m for vehicle in plant.vehicles]),
         _driven(plant, coordinator.entered()[0], len(arrivals)),
@@ -101,15 +102,18 @@ def _run_cooperative(
     if samples is None:
         return outcome
     if keep:
-        positions = together(
-            (
-                reports_of_samples(*samples.motion, rules.control.step_s),
-                positions_in_sumo(plant, outcome.vehicle_of_row, rules.control.step_s),
-            )
-        )
+        positions = _reported(plant, outcome.vehicle_of_row, samples, step_s)
         told = Told(arrivals, channel.commands, positions, (), end_step)
         outcome = replace(outcome, told=told)
     return _as_seen(outcome, samples) if sampled else outcome
+
+
+def _reported(
+    plant: CooperativePlant, vehicle_of_row: IntArray, samples: Samples, step_s: float
+) -> Positions:
+    """What vehicles report of themselves: once a second, at changes, where they are compared."""
+    told = positions_in_sumo(plant, vehicle_of_row, step_s)
+    return together((reports_of_samples(*samples.motion, step_s), told))
 
 
 def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:

@@ -76,15 +76,12 @@ def run_uncontrolled(
     outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
     told = None
     if options.keep_messages:
-        left = not np.isnan(outcome.passages.exit_s).any()
-        end_step = min(cap_step, step_after(outcome.end_s if left else math.inf, step_s))
+        end_step = _end_step(outcome, cap_step, step_s)
         told = _told_of_drivers(arrivals, samples, road.told, meter, step_s, end_step)
-    passages = outcome.passages
-    if automated is not None:
-        passages = replace(passages, automated=automated.vehicles)
+    alone = None if automated is None else automated.vehicles
     return replace(
         outcome,
-        passages=passages,
+        passages=replace(outcome.passages, automated=alone),
         refusals=tuple(service.coordinator.refusals),
         interventions=service.coordinator.interventions,
         told=told,
@@ -92,6 +89,12 @@ def run_uncontrolled(
         collided=collided,
         world_events=tuple(careless.events),
     )
+
+
+def _end_step(outcome: Outcome, cap_step: int, step_s: float) -> int:
+    """The step at which a run is over: the last exit's, or where it is cut off."""
+    left = not np.isnan(outcome.passages.exit_s).any()
+    return min(cap_step, step_after(outcome.end_s if left else math.inf, step_s))
 
 
 def alone_among_drivers(
