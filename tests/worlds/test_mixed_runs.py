@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import coramp
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.metrics.mixed_figures import safety_events
-from coramp.mixed.situation import Situation
+from coramp.mixed.situation import MixedSituation
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.mixed_slots import MixedSlots
@@ -294,7 +294,7 @@ def known_numbers(monkeypatch, connected_share):
     seen = set()
     own = MixedSlots.steer
 
-    def steer(self, situation: Situation, places):
+    def steer(self, situation: MixedSituation, places):
         seen.update(situation.users.number.tolist())
         return own(self, situation, places)
 

@@ -13,17 +13,17 @@ from coramp.road.lanes import MAINLINE, RAMP
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.merge_state import BY_MAINLINE_S
 from coramp.worlds.outcomes import cap_step_of, passages_of
-from coramp.worlds.sumo.files import Samples
+from coramp.worlds.sumo.files import RunFiles, Samples
 
 
 def outcome_as_driven(
     scenario: Scenario,
     arrivals: Sequence[Arrival],
     samples: Samples,
-    finished: set[str],
-    collisions: int,
+    files: RunFiles,
 ) -> Outcome:
     """Returns what happened: who passed when and how each drove, at SUMO's steps."""
+    finished = files.finished()
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     entry_s, exit_s = _passing_times(samples, arrivals, finished, scenario.mainline.end_m, step_s)
     first, rows = pieces_of_samples(*samples.motion, len(arrivals))
@@ -43,7 +43,8 @@ def outcome_as_driven(
         driven=Pieces(first, rows),
         lanes=lanes,
         end_s=end_s,
-        collisions=collisions,
+        collisions=files.collisions(),
+        collided=files.collided(arrivals),
     )
 
 

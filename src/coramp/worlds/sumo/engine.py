@@ -78,10 +78,7 @@ def _run_cooperative(
                 channel if keep else plant,
             )
             cap_step = cap_step_of(scenario)
-            coordinator.expect_arrivals()
-            coordinator.run(cap_step)
-            end_step = min(cap_step, step_after_last_exit(coordinator, rules.control.step_s))
-            plant.finish(end_step)
+            end_step = _let_drive(coordinator, plant, cap_step, rules.control.step_s)
             if end_step < cap_step and session.vehicles_left():
                 raise CorampError("SUMO: vehicles are left although every plan has ended")
         if options.keep_in is not None:
@@ -106,6 +103,17 @@ def _run_cooperative(
         told = Told(arrivals, channel.commands, positions, (), end_step)
         outcome = replace(outcome, told=told)
     return _as_seen(outcome, samples) if sampled else outcome
+
+
+def _let_drive(
+    coordinator: Coordinator, plant: CooperativePlant, cap_step: int, step_s: float
+) -> int:
+    """Runs until everybody has left; returns the step at which that was, at most the cap."""
+    coordinator.expect_arrivals()
+    coordinator.run(cap_step)
+    end_step = min(cap_step, step_after_last_exit(coordinator, step_s))
+    plant.finish(end_step)
+    return end_step
 
 
 def _reported(

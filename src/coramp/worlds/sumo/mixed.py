@@ -69,15 +69,13 @@ def run_mixed(
             careless = Careless(scenario, session, seed)
             control.drive(plant, careless, cap_step_of(scenario))
         files.keep()
-        samples, finished = files.samples(arrivals), files.finished()
-        collisions, collided = files.collisions(), files.collided(arrivals)
-    outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
+        samples = files.samples(arrivals)
+        outcome = outcome_as_driven(scenario, arrivals, samples, files)
     passages = replace(outcome.passages, plan_error_m=plant.largest_error_m, automated=automated)
     return replace(
         outcome,
         passages=passages,
         drivers=population,
-        collided=collided,
         messages_of_air=control.air.counts,
         world_events=tuple(careless.events),
     )

@@ -71,9 +71,8 @@ def run_uncontrolled(
             careless = CarelessDrivers(Careless(scenario, session, seed), plan, arrivals)
             _let_drive(session, service, road, meter, careless, Looks(look_steps, cap_step))
         files.keep()
-        samples, finished = files.samples(arrivals), files.finished()
-        collisions, collided = files.collisions(), files.collided(arrivals)
-    outcome = outcome_as_driven(scenario, arrivals, samples, finished, collisions)
+        samples = files.samples(arrivals)
+        outcome = outcome_as_driven(scenario, arrivals, samples, files)
     told = None
     if options.keep_messages:
         end_step = _end_step(outcome, cap_step, step_s)
@@ -86,7 +85,6 @@ def run_uncontrolled(
         interventions=service.coordinator.interventions,
         told=told,
         drivers=population,
-        collided=collided,
         world_events=tuple(careless.events),
     )
 
