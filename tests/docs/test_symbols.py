@@ -9,15 +9,20 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
+from coramp.cli.ramp_listing import ramp_rows
 from coramp.messages import kinds
+from coramp.networks.net_file import read_network
+from coramp.networks.ramps import on_ramps
 from coramp.records import schemas
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.defaults import DERIVED
+from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.snapshots import Snapshot
 from coramp.strategies.parameters import parameters_of
 from coramp.strategies.registry import strategies
 from coramp.studies.definition import Study
+from coramp.worlds.sumo.network import network_file, road_plan
 from tests.mathematics import mathematics
 
 PAGE = Path(__file__).parents[2] / "docs" / "symbols.md"
@@ -48,6 +53,7 @@ FILES = {
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
 }
+RAMPS = "coramp ramps --json"
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}
 
 
@@ -154,6 +160,12 @@ def test_every_key_of_run_json_stands_there():
     assert sorted(names("run.json")) == sorted(run_content(make_spec("paper"), {}))
 
 
+def test_every_key_of_an_on_ramp_stands_there_in_order():
+    network = read_network(network_file(road_plan(load_scenario("paper"))))
+    (row,) = ramp_rows(on_ramps(network))
+    assert names(RAMPS) == list(row)
+
+
 @pytest.mark.parametrize("section", MODELS)
 def test_every_key_of_a_model_stands_there_once(section):
     assert sorted(names(section)) == sorted(keys_of(MODELS[section]))
@@ -180,7 +192,7 @@ def test_defaults_are_those_of_the_models(section):
             assert shown.replace('"', "'") == repr(default), name
 
 
-@pytest.mark.parametrize("section", [*FILES, *MODELS])
+@pytest.mark.parametrize("section", [*FILES, *MODELS, RAMPS])
 def test_units_are_those_that_the_names_end_in(section):
     for row in TABLES[section]:
         name = row["name"].strip("`").rsplit(".", 1)[-1]

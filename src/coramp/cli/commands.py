@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from coramp.cli.listing_commands import listing
+from coramp.cli.network_commands import networks
 from coramp.cli.options import DEBUG
 from coramp.cli.page_commands import showing
 from coramp.cli.run_commands import computing
@@ -39,5 +40,5 @@ def _options(
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
 
-for commands in (listing, computing, showing):
+for commands in (listing, networks, computing, showing):
     app.add_typer(commands)

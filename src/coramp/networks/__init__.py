@@ -1,0 +1,1 @@
+"""SUMO networks as values: their on-ramps, and stations along each of them."""
