@@ -1,10 +1,13 @@
 """`coramp ramps`: tables, JSON, notes, pictures, and what it refuses."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from coramp.cli.ramp_listing import KEPT
+from coramp.cli.ramp_listing import KEPT, notes_on
+from coramp.networks.net_file import read_network
+from coramp.networks.ramps import on_ramps
 from tests.edges import assert_refused, invoke
 from tests.networks import A10KW, HIGHWAY, LINK, RAMP, ROAD, SHIPPED, made
 
@@ -48,6 +51,14 @@ def test_who_wrote_a_network_and_what_is_left_out_is_told():
     assert invoke("ramps", HIGHWAY).errors == [
         f"Note: {HIGHWAY}: {by} and reads it",
         f"Note: {HIGHWAY}: no on-ramp at {links}: links join each other there",
+    ]
+
+
+def test_a_note_names_a_few_edges_and_counts_the_others():
+    network = read_network(HIGHWAY)
+    found = replace(on_ramps(network), links=tuple("abcdefg"))
+    assert list(notes_on(network, found))[1:] == [
+        "no on-ramp at a, b, c, d, e and 2 other edges: links join each other there"
     ]
 
 

@@ -120,12 +120,29 @@ def test_a_lane_that_goes_on_is_gained(tmp_path):
     assert reason_against(ramp) == "lane gain: coramp needs an acceleration lane that ends"
 
 
+def test_a_lane_that_goes_on_while_that_of_the_mainline_ends_is_gained(tmp_path):
+    ways = '<connection from="merge" to="down" fromLane="0" toLane="0"/>'
+    assert merges(only_ramp(made(tmp_path, connections=ways))) == ("lane gain", None)
+
+
 def test_a_lane_that_leaves_by_the_next_exit_weaves(tmp_path):
     exit_edge = 'from="end" to="exit" numLanes="1" speed="22.22"'
     file = made(tmp_path, {**ROAD, "off": exit_edge})
     ramp = only_ramp(file)
     assert merges(ramp) == ("weaving lane", lengths_m(file)["merge_0"])
     assert [edge.edge_id for edge in ramp.downstream.edges] == ["merge"]
+
+
+def test_a_lane_weaves_where_the_lane_beside_it_may_leave_too(tmp_path):
+    exit_edge = 'from="end" to="exit" numLanes="2" speed="33.3"'
+    ways = "".join(
+        f'<connection from="merge" to="{to}" fromLane="{lane}" toLane="{onto}"/>'
+        for to, lane, onto in (("down", 1, 0), ("off", 0, 0), ("off", 1, 1))
+    )
+    for through, link in ((' priority="2"', ""), ("", ' type="highway.motorway_link"')):
+        edges = {**ROAD, "down": DOWN + through, "off": exit_edge + link}
+        file = made(tmp_path, edges, connections=ways)
+        assert merges(only_ramp(file)) == ("weaving lane", lengths_m(file)["merge_0"])
 
 
 def test_a_lane_that_ends_in_the_lane_beside_it_is_an_acceleration_lane(tmp_path):
@@ -308,7 +325,19 @@ def test_a_metered_ramp_is_a_ramp(tmp_path):
     ]
     assert lines != text.splitlines()
     file.write_text("\n".join(lines), "utf-8")
-    assert only_ramp(file).ramp_id == "link@merge"
+    ramp = only_ramp(file)
+    assert ramp.ramp_id == "link@merge"
+    assert "a signal on the ramp: coramp knows none of a network's own" in reason_against(ramp)
+
+
+def test_a_bend_that_slows_down_cannot_be_coordinated(tmp_path):
+    ramp = only_ramp(made(tmp_path, nodes={"south": (-300, -400)}))
+    slow_mps = ramp.ramp_way.inside[0].limit_mps
+    assert slow_mps < ramp.ramp_edge.highest_limit_mps
+    assert reason_against(ramp) == (
+        f"a bend inside a junction of the ramp that allows {slow_mps:g} m/s: "
+        "coramp knows none so far"
+    )
 
 
 def test_a_network_of_netgenerate_without_ramps_has_none():

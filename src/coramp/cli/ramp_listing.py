@@ -14,6 +14,8 @@ from coramp.studies.tables import Table, number
 
 MILLIMETRES = 3
 """Digits of lengths in m: SUMO gives its own to the centimetre."""
+MOST_NAMED = 5
+"""A note names no more edges than these."""
 KEPT = ("on-ramp", "merging", "acceleration lane (m)", "mainline lanes", "coordinated")
 """Columns that a narrow terminal keeps longest."""
 
@@ -102,7 +104,10 @@ def notes_on(network: Network, found: Found) -> Iterator[str]:
         (found.equals, "the roads that join there are alike"),
     ):
         if edges:
-            yield f"no on-ramp at {', '.join(edges)}: {what}"
+            named = ", ".join(edges[:MOST_NAMED])
+            if len(edges) > MOST_NAMED:
+                named += f" and {len(edges) - MOST_NAMED} other edges"
+            yield f"no on-ramp at {named}: {what}"
 
 
 def _of_another_version(network: Network) -> str:

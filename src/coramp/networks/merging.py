@@ -67,16 +67,28 @@ def _followed(
         length_m += edge.length_m
         ways = [way for way in network.out_of(edge.edge_id) if way.from_lane == lane]
         through = [way for way in network.out_of(edge.edge_id) if way.from_lane in of_mainline]
+        if not through:
+            return LANE_GAIN, None
         if not ways or _joins(ways, through):
-            return (ACCELERATION_LANE, length_m) if through else (LANE_GAIN, None)
-        ahead = Counter(way.to_edge for way in through).most_common(1)
-        if ahead and all(way.to_edge != ahead[0][0] for way in ways):
+            return ACCELERATION_LANE, length_m
+        if all(way.to_edge != _onward(network, through) for way in ways):
             return WEAVING_LANE, length_m
         if k + 1 < len(downstream.edges):
             length_m += ways[0].length_m
             lane = ways[0].to_lane
             of_mainline = {way.to_lane for way in through}
     return LANE_GAIN, None
+
+
+def _onward(network: Network, through: Sequence[Connection]) -> str:
+    """The edge by which the mainline goes on: that of most lanes, and rather a road than a link."""
+    ways = Counter(way.to_edge for way in through)
+
+    def rank(name: str) -> tuple[int, bool, int, int]:
+        edge = network.edges[name]
+        return ways[name], not edge.is_link, edge.priority, len(edge.lanes)
+
+    return max(ways, key=rank)
 
 
 def _joins(ways: Sequence[Connection], through: Sequence[Connection]) -> bool:

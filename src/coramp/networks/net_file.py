@@ -6,6 +6,7 @@ import math
 import re
 import xml.sax
 import zlib
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ WRITER = re.compile(r"by Eclipse SUMO (\w+) (?:Version )?(\S+)")
 LONGEST_HEAD = 4000
 """Within so many characters a network says what wrote it."""
 CARS = "passenger"
+UNREADABLE = (LookupError, ValueError, AttributeError)
+"""What sumolib and the parser raise at values that no network has, and at what is missing."""
 GZIP = b"\x1f\x8b"
 
 
@@ -31,7 +34,7 @@ def read_network(path: Path) -> Network:
     reader, root = _parsed(path, content)
     try:
         return _network(reader.getNet(), root, content[:LONGEST_HEAD].decode("utf-8", "replace"))
-    except (KeyError, ValueError, IndexError, AttributeError) as error:
+    except UNREADABLE as error:
         raise CorampError(_incomplete(path, error)) from error
 
 
@@ -76,7 +79,7 @@ def _parsed(path: Path, content: bytes) -> tuple[Any, dict[str, str]]:
         raise CorampError(
             f"{path}: {what}: line {line}: {error.getMessage()}; {ALLOWED}"
         ) from error
-    except (KeyError, ValueError, IndexError, AttributeError) as error:
+    except UNREADABLE as error:
         raise CorampError(_incomplete(path, error)) from error
     return reader, root
 
@@ -117,6 +120,8 @@ def _lane(lane: Any) -> Lane:
         raise ValueError(
             f"lane {found.lane_id} of {found.length_m} m with a limit of {found.limit_mps} m/s"
         )
+    if len(found.shape_m) < 2 or not all(map(math.isfinite, chain(*found.shape_m))):
+        raise ValueError(f"lane {found.lane_id} without a shape of two points or more")
     return found
 
 

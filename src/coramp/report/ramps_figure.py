@@ -125,8 +125,9 @@ def _lane(ramp: OnRamp, index: int) -> Lane:
 
 def _turned(ramp: OnRamp, lane: Lane) -> list[Point]:
     """A lane as seen from the nose of the mainline lane beside the ramp's, along that one."""
-    (x0, y0), (x1, y1) = _lane(ramp, ramp.mainline_way.to_lane).shape_m[:2]
-    away_m = math.hypot(x1 - x0, y1 - y0)
+    start, *bends = _lane(ramp, ramp.mainline_way.to_lane).shape_m
+    (x0, y0), (x1, y1) = start, next((point for point in bends if point != start), bends[0])
+    away_m = math.hypot(x1 - x0, y1 - y0) or 1.0
     along, across = (x1 - x0) / away_m, (y1 - y0) / away_m
     return [
         (

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coramp.errors import CorampError
-from coramp.networks.graph import Edge
+from coramp.networks.graph import Connection, Edge
 from coramp.networks.merging import ACCELERATION_LANE
 from coramp.networks.ramps import OnRamp
 from coramp.scenarios.defaults import with_defaults
@@ -61,15 +61,34 @@ def _differences(ramp: OnRamp) -> Iterator[str]:
     elif len(ramp.merge_edge.lanes) > len(ramp.mainline_edge.lanes) + len(ramp.ramp_edge.lanes):
         lanes = len(ramp.merge_edge.lanes)
         yield f"{lanes} lanes behind the nose: coramp knows those that come from before it"
+    before, behind = ramp.mainline, ramp.downstream
+    crossings = (*before.crossings, *behind.crossings)
+    mainline_ways = [way for crossing in crossings for way in crossing.ways]
+    ramp_ways = [way for crossing in ramp.ramp.crossings for way in crossing.ways]
     roads = (
-        ("mainline", (*ramp.mainline.edges, *ramp.downstream.edges)),
-        ("ramp", ramp.ramp.edges),
+        ("mainline", (*before.edges, *behind.edges), (*mainline_ways, *ramp.mainline_ways)),
+        ("ramp", ramp.ramp.edges, (*ramp_ways, *ramp.ramp_ways)),
     )
-    for name, edges in roads:
+    for name, edges, ways in roads:
         limits_mps = _limits_mps(edges)
         if len(limits_mps) > 1:
             told = ", ".join(f"{limit:g}" for limit in limits_mps)
             yield f"speed limits of {told} m/s on the {name}: coramp knows one so far"
+        yield from _junction_differences(name, ways, limits_mps[0])
+
+
+def _junction_differences(
+    name: str, ways: tuple[Connection, ...], lowest_mps: float
+) -> Iterator[str]:
+    """What the junctions on a road have that coramp's road has not, by its lowest speed limit."""
+    if any(way.is_signalled for way in ways):
+        yield f"a signal on the {name}: coramp knows none of a network's own"
+    limit_mps = min((lane.limit_mps for way in ways for lane in way.inside), default=lowest_mps)
+    if limit_mps < lowest_mps:
+        yield (
+            f"a bend inside a junction of the {name} that allows {limit_mps:g} m/s: coramp knows "
+            "none so far"
+        )
 
 
 def _limits_mps(edges: tuple[Edge, ...]) -> list[float]:
