@@ -6,8 +6,10 @@ from dataclasses import replace
 import pytest
 
 from coramp.cli.ramp_listing import KEPT, notes_on
+from coramp.errors import CorampError
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
+from coramp.report.ramps_figure import save_ramps_figure
 from tests.edges import assert_refused, invoke
 from tests.networks import A10KW, HIGHWAY, LINK, RAMP, ROAD, SHIPPED, made
 
@@ -128,6 +130,31 @@ def test_what_cannot_be_listed_or_drawn_is_one_line(tmp_path):
     told = invoke("ramps", without, "--plot", tmp_path / "ramps.png")
     assert told.errors == ["Error: --plot: there is no on-ramp to draw"]
     assert not (tmp_path / "ramps.png").exists()
+
+
+def test_one_on_ramp_may_be_chosen_by_its_id():
+    (row,) = json.loads(invoke("ramps", A10KW, "--ramp", "24498409@4054057", "--json").out)
+    assert row["id"] == "24498409@4054057"
+    told = invoke("ramps", A10KW, "--ramp", "gone@4054057")
+    assert_refused(told)
+    allowed = "24498409@4054057, 308396220@264308374"
+    assert told.errors == [
+        f"Error: {A10KW}: there is no on-ramp 'gone@4054057'; allowed are {allowed}"
+    ]
+
+
+def test_one_of_a_network_without_any_is_refused(tmp_path):
+    file = made(tmp_path, {name: ROAD[name] for name in ("main", "merge", "down")})
+    told = invoke("ramps", file, "--ramp", "link@merge")
+    assert_refused(told)
+    assert told.err.endswith("allowed are none: there is no on-ramp\n")
+
+
+def test_more_on_ramps_than_a_figure_holds_are_refused(tmp_path):
+    found = on_ramps(read_network(RAMP))
+    many = replace(found, ramps=found.ramps * 7)
+    with pytest.raises(CorampError, match=r"14 on-ramps are too many for a figure; .*by --ramp"):
+        save_ramps_figure(read_network(RAMP), many, tmp_path / "many.png")
 
 
 def test_help_has_an_example():

@@ -17,7 +17,7 @@ from coramp.networks.stations import Place, stations_of
 from coramp.road.lanes import ACCELERATION_LANE, MAINLINE, RAMP
 from coramp.scenarios.loading import load_scenario
 from coramp.worlds.sumo.network import network_file, road_plan, sumo_binary
-from tests.networks import HIGHWAY, MERGE, ROAD, SHIPPED, made, only_ramp
+from tests.networks import A10KW, HIGHWAY, MERGE, ROAD, SHIPPED, made, only_ramp
 from tests.networks import RAMP as RAMP_NETWORK
 
 NEAR_M = 0.01
@@ -204,6 +204,7 @@ def driven(folder, network, first, last):
     [
         (HIGHWAY, "201283198.145.16@E0", "201283198"),
         (HIGHWAY, "201283198.145.16@E0", "145354574"),
+        (A10KW, "24498409@4054057", "-24498410#1"),
         (RAMP_NETWORK, "gneE14@gneE7", "gneE13"),
         (RAMP_NETWORK, "gneE14@gneE7", "gneE3"),
     ],

@@ -19,6 +19,9 @@ def ramps(
     network: Annotated[
         Path, typer.Argument(metavar="NET", help="A SUMO network, .net.xml or .net.xml.gz.")
     ],
+    ramp: Annotated[
+        str | None, typer.Option(metavar="ID", help="Only the on-ramp of this id.")
+    ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw every on-ramp (png, svg or pdf).")] = None,
     json: Json = False,
     wide: Wide = False,
@@ -26,13 +29,15 @@ def ramps(
 ) -> None:
     """List the on-ramps of a SUMO network, and whether coramp can coordinate them."""
     from coramp.cli.console import print_json, print_table
-    from coramp.cli.ramp_listing import listed, notes_on, ramp_rows, ramp_table
+    from coramp.cli.ramp_listing import listed, notes_on, only, ramp_rows, ramp_table
     from coramp.networks.net_file import read_network
     from coramp.networks.ramps import on_ramps
     from coramp.studies.speed_unit import KMH, MPS
 
     read = read_network(network)
     found = on_ramps(read)
+    if ramp is not None:
+        found = only(found, ramp, network)
     rows = ramp_rows(found)
     if plot is not None:
         from coramp.report.ramps_figure import save_ramps_figure

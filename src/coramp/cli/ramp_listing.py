@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
+from coramp.errors import CorampError
 from coramp.networks.graph import Network
 from coramp.networks.net_file import FORMAT
 from coramp.networks.ramps import Found, OnRamp
@@ -18,6 +19,14 @@ MOST_NAMED = 5
 """A note names no more edges than these."""
 KEPT = ("on-ramp", "merging", "acceleration lane (m)", "mainline lanes", "coordinated")
 """Columns that a narrow terminal keeps longest."""
+
+
+def only(found: Found, ramp_id: str, network: Path) -> Found:
+    """Returns one on-ramp of a network alone; raises CorampError where there is none of that id."""
+    try:
+        return Found((found.named(ramp_id),), (), ())
+    except CorampError as error:
+        raise CorampError(f"{network}: {error}") from error
 
 
 def ramp_rows(found: Found) -> list[Row]:

@@ -8,6 +8,7 @@ lanes, of the higher speed limit, or that goes straight on, in this order.
 import math
 from dataclasses import dataclass
 
+from coramp.errors import CorampError
 from coramp.networks.course import (
     Course,
     course_ahead_from,
@@ -90,6 +91,14 @@ class Found:
     ramps: tuple[OnRamp, ...]
     links: tuple[str, ...]
     equals: tuple[str, ...]
+
+    def named(self, ramp_id: str) -> OnRamp:
+        """Returns the on-ramp of an id; raises CorampError where there is none such."""
+        for ramp in self.ramps:
+            if ramp.ramp_id == ramp_id:
+                return ramp
+        known = ", ".join(ramp.ramp_id for ramp in self.ramps) or "none: there is no on-ramp"
+        raise CorampError(f"there is no on-ramp {ramp_id!r}; allowed are {known}")
 
 
 def on_ramps(network: Network) -> Found:

@@ -45,7 +45,7 @@ def save_ramps_figure(network: Network, found: Found, path: Path) -> None:
     if len(found.ramps) > MOST:
         raise CorampError(
             f"--plot: {len(found.ramps)} on-ramps are too many for a figure; "
-            f"allowed are up to {MOST}"
+            f"allowed are up to {MOST}, or one by --ramp"
         )
     save_plot(lambda: ramps_figure(network, found.ramps), path)
 
