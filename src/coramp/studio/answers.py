@@ -21,7 +21,7 @@ from coramp.runs.running import RunSpec, recorded
 from coramp.studies.tables import Table
 from coramp.studio.dials import AUTOMATION, DECIDING, NOTHING, Studio
 from coramp.studio.process import Played, Simulated, SumoProcesses, played_from
-from coramp.studio.world import PRESET_WORDS, by_kind, world_of
+from coramp.studio.world import by_kind, folded, preset_words, world_of
 
 KEPT_RUNS = 16
 """So many runs are remembered, so that going back to one shows it at once."""
@@ -86,7 +86,7 @@ class Answers:
             start=studio.start,
             choices=[(name, _called(name)) for name in studio.choices],
             among=studio.among_drivers,
-            presets=PRESET_WORDS,
+            presets=preset_words(studio.scenario),
             drivers=list(studio.scenario.drivers),
             nothing=NOTHING,
             runs={},
@@ -118,6 +118,11 @@ class Answers:
         finally:
             self._leave(jobs)
 
+    def get_ready(self) -> None:
+        """Computes the first picture, and starts the processes that runs in SUMO will need."""
+        self.runs({})
+        self._processes.get_ready()
+
     def close(self) -> None:
         """Ends the processes of runs in SUMO."""
         self._processes.close()
@@ -125,12 +130,14 @@ class Answers:
     def _told(self, specs: Sequence[RunSpec], found: Sequence[Played]) -> str:
         runs = [run for run, _ in found]
         kinds = by_kind(runs)
+        figures, more = folded(comparison_table(runs))
         told = {
             "world": [{"title": title_of(run), "told": world_of(run)} for run in runs],
             "answer": " ".join(map(answer, runs)),
             "notes": [line for run in runs for line in notes(run)],
             "moved": _moved(specs[0]),
-            "tables": [_as_data(table) for table in (kinds, comparison_table(runs)) if table],
+            "tables": [_as_data(table) for table in (kinds, figures) if table],
+            "folded": [_as_data(more)] if more.rows else [],
             "command": self._command(specs[0]),
         }
         return f'{json.dumps(told)[:-1]}, "runs": [{",".join(text for _, text in found)}]}}'

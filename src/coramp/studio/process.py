@@ -172,6 +172,16 @@ class SumoProcesses:
             raise CorampError(*found.messages)
         return found
 
+    def get_ready(self) -> None:
+        """Starts processes, so that runs need not wait for that."""
+        taken = 0
+        while taken < MOST and self._free.acquire(blocking=False):
+            taken += 1
+        processes = [self._taken() for _ in range(taken)]
+        for process in processes:
+            self._give_back(process)
+            self._free.release()
+
     def close(self) -> None:
         """Ends all processes."""
         with self._lock:

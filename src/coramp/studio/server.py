@@ -163,7 +163,7 @@ def serve(scenario: str, port: int, say: Callable[[str], None]) -> None:
     """
     with StudioServer(scenario, port) as server:
         # The first picture is computed while the browser opens.
-        threading.Thread(target=server.answers.runs, args=({},), daemon=True).start()
+        threading.Thread(target=server.answers.get_ready, daemon=True).start()
         say(server.address)
         try:
             server.serve_forever()

@@ -3,18 +3,21 @@
 from collections.abc import Iterator, Sequence
 
 from coramp.records.run import RunRecords
-from coramp.records.schemas import Row
+from coramp.records.schemas import MIXED_METRICS, Row
 from coramp.records.world_told import told_of_world
 from coramp.report.page.shown import title_of
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import PRESETS, TABLES
+from coramp.studies.metric_labels import label_of, typeset
 from coramp.studies.tables import Table, number
 
+WORLD = "world"
+"""The table that names the preset."""
 PERFECT = "none"
 """The preset that stands for none."""
 PRESET_WORDS = {
-    PERFECT: "none",
+    PERFECT: "perfect",
     "mild": "mild: a good network",
     "hard": "hard: a bad network, slow vehicles",
     "rtk-5g": "rtk-5g: positions within 5 cm, private 5G",
@@ -23,6 +26,12 @@ PRESET_WORDS = {
     "winter": "winter: packed snow",
 }
 """The presets of a scenario's world, in words of a list."""
+
+
+def preset_words(scenario: Scenario) -> dict[str, str]:
+    """Returns the presets in words; without one, the scenario's own tables may still hold."""
+    own = scenario.has_faults and scenario.world.preset is None
+    return PRESET_WORDS | ({PERFECT: "as in the scenario"} if own else {})
 
 
 def share_percent(scenario: Scenario) -> float:
@@ -70,18 +79,17 @@ def _kinds(run: RunRecords) -> str:
         return f"all {every} vehicles with {drivers}"
     if automated == every:
         return f"all {every} vehicles automated"
-    return f"{automated} of {every} vehicles automated, the others with {drivers}"
+    share = f"share of {share_percent(run.scenario):g} %"
+    return f"{share}, {automated} of {every} vehicles automated, the others with {drivers}"
 
 
 def _faults(scenario: Scenario) -> str:
     """What of the world is not perfect."""
-    tables = [table for table in TABLES if not getattr(scenario, table).is_perfect]
-    if not tables:
-        return "nothing goes wrong"
     preset = scenario.world.preset
-    of_preset = PRESETS.get(preset or "", {})
+    of_preset = {WORLD, *PRESETS.get(preset or "", ())}
+    own = [t for t in TABLES if t not in of_preset and not getattr(scenario, t).is_perfect]
     named = [f"preset {preset}"] if preset else []
-    return ", ".join([*named, *(f"[{table}]" for table in tables if table not in of_preset)])
+    return ", ".join([*named, *(f"[{table}]" for table in own)]) or "a perfect world"
 
 
 def by_kind(runs: Sequence[RunRecords]) -> Table | None:
@@ -89,7 +97,10 @@ def by_kind(runs: Sequence[RunRecords]) -> Table | None:
     if not any(run.is_mixed for run in runs):
         return None
     columns = [column for run in runs for column in _kinds_of(run)]
-    names = ("vehicles", "delay (s)", "brakings above 3 m/s²", "collisions caused")
+    names = (
+        *("vehicles", "delay (s)", "brakings beyond 3 m/s²"),
+        *("collisions caused", "of these, among drivers"),
+    )
     rows = tuple(zip(names, *(cells for _, cells in columns), strict=True))
     return Table("Figures by kind of vehicle", ("what", *(title for title, _ in columns)), rows)
 
@@ -98,23 +109,37 @@ def _kinds_of(run: RunRecords) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Each kind of vehicle of a run: what its column is called, and its figures."""
     row, every, title = run.summary, run.vehicles.height, title_of(run)
     if not run.is_mixed:
+        alone = row["drivers"] is not None and not row["automated_vehicles"]
+        among = row["collisions"] if alone else None
         whole = (row["delay_s"], row["hard_brakings_3"], row["collisions"])
-        yield f"{title}: all", _cells(every, *whole)
+        yield f"{title}: all", _cells(every, *whole, among)
         return
-    automated = row["automated_vehicles"]
-    for kind, count, collisions in (
-        ("automated", automated, row["collisions_by_automated"]),
-        (
-            "driver",
-            every - automated,
-            row["collisions_by_driver"] + row["collisions_among_drivers"],
-        ),
-    ):
-        figures = row[f"{kind}_delay_s"], row[f"{kind}_hard_brakings_3"]
-        yield f"{title}: {kind}{'s' * (kind == 'driver')}", _cells(count, *figures, collisions)
+    automated, caused = row["automated_vehicles"], row["collisions_by_automated"]
+    among = row["collisions_among_drivers"]
+    yield f"{title}: automated", _cells(automated, *_figures_of("automated", row), caused)
+    caused = row["collisions_by_driver"] + among
+    yield f"{title}: drivers", _cells(every - automated, *_figures_of("driver", row), caused, among)
+
+
+def _figures_of(kind: str, row: Row) -> tuple[float | None, int | None]:
+    return row[f"{kind}_delay_s"], row[f"{kind}_hard_brakings_3"]
 
 
 def _cells(
-    vehicles: int, delay_s: float | None, brakings: int | None, collisions: int | None
+    vehicles: int,
+    delay_s: float | None,
+    brakings: int | None,
+    caused: int | None = None,
+    among: int | None = None,
 ) -> tuple[str, ...]:
-    return (number(vehicles), number(delay_s, 2), number(brakings), number(collisions))
+    counts = (number(brakings, 0), number(caused, 0), number(among, 0))
+    return number(vehicles, 0), number(delay_s), *counts
+
+
+def folded(table: Table) -> tuple[Table, Table]:
+    """Returns the figures that every run has, and those that only runs among drivers have."""
+    titles = {typeset(label_of(name)) for name in MIXED_METRICS}
+    of_kinds = tuple(row for row in table.rows if row[0] in titles)
+    others = tuple(row for row in table.rows if row[0] not in titles)
+    title = "More figures of runs in SUMO: kinds of vehicles, messages, conflicts"
+    return Table(table.title, table.columns, others), Table(title, table.columns, of_kinds)
