@@ -11,7 +11,6 @@ from threading import Lock, Thread
 import tomli_w
 
 from coramp.errors import CorampError
-from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
@@ -106,8 +105,8 @@ class Answers:
         jobs: list[Job] = []
         try:
             specs = self.studio.specs(asked)
-            for spec in sorted(specs, key=lambda spec: spec.engine != "sumo"):
-                jobs.append(self._joined(spec))
+            in_sumo_first = sorted(specs, key=lambda spec: spec.engine != "sumo")
+            jobs.extend(self._joined(spec) for spec in in_sumo_first)
             while not _are_done(jobs):
                 yield json.dumps({"progress": [job.progress() for job in jobs]})
                 wait([job.played for job in jobs], TICK_S, FIRST_EXCEPTION)

@@ -168,9 +168,7 @@ class Studio:
             for name in dict.fromkeys(wanted)
         ]
 
-    def _spec(
-        self, name: str, world: Scenario, overrides: Row, drivers: str, seed: int
-    ) -> RunSpec:
+    def _spec(self, name: str, world: Scenario, overrides: Row, drivers: str, seed: int) -> RunSpec:
         """The run of a choice in a world that the overrides make of the scenario."""
         strategy, _, own_drivers = name.partition(":")
         shares: Row = {}
@@ -190,7 +188,7 @@ class Studio:
         )
 
     def _check_world(self, asked: Mapping[str, str]) -> None:
-        allowed = {"preset": PRESET_WORDS, "drivers": self.scenario.drivers}
+        allowed = {"preset": list(PRESET_WORDS), "drivers": list(self.scenario.drivers)}
         for name, known in allowed.items():
             if name in asked and asked[name] not in known:
                 raise CorampError(

@@ -5,9 +5,11 @@ libsumo has one simulation a process, and cannot be stopped from another thread.
 
 import json
 import math
+import shutil
 import signal
 import tempfile
 import time
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -32,7 +34,7 @@ TELL_S = 0.1
 """At most so often a process tells how far it is."""
 
 
-class Unwanted(CorampError):
+class UnwantedError(CorampError):
     """Nobody waits for a run any more."""
 
     def __init__(self) -> None:
@@ -61,14 +63,11 @@ class SumoProcess:
 
     def __init__(self) -> None:
         # What a process that is killed leaves behind lies in a folder that is then removed.
-        self._folder = tempfile.TemporaryDirectory(
-            prefix="coramp-studio-", ignore_cleanup_errors=True
-        )
+        folder = tempfile.mkdtemp(prefix="coramp-studio-")
+        self._remove_folder = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         spawned = get_context("spawn")
         self._pipe, theirs = spawned.Pipe()
-        self._process = spawned.Process(
-            target=_make_runs, args=(theirs, self._folder.name), daemon=True
-        )
+        self._process = spawned.Process(target=_make_runs, args=(theirs, folder), daemon=True)
         self._process.start()
         theirs.close()
 
@@ -82,7 +81,7 @@ class SumoProcess:
     ) -> Played | Failed:
         """Returns a run, or why it failed.
 
-        Raises Unwanted as soon as it is not wanted, and CorampError if the process ends. After
+        Raises UnwantedError as soon as it is not wanted, and CorampError if the process ends. After
         either, the process must be killed.
         """
         try:
@@ -90,7 +89,7 @@ class SumoProcess:
             while True:
                 while not self._pipe.poll(LOOK_S):
                     if not wanted():
-                        raise Unwanted
+                        raise UnwantedError
                 told = self._pipe.recv()
                 if not isinstance(told, Simulated):
                     return told  # type: ignore[no-any-return]
@@ -107,7 +106,7 @@ class SumoProcess:
         self._process.kill()
         self._process.join()
         self._pipe.close()
-        self._folder.cleanup()
+        self._remove_folder()
 
 
 def _make_runs(pipe: Connection, folder: str) -> None:
@@ -132,7 +131,7 @@ def _made(spec: RunSpec, pipe: Connection) -> Played | Failed:
         return played_from(recorded(spec, SumoOptions(tell=tell)))
     except CorampError as error:
         return Failed(error.messages)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - whatever it is, the page is to say it
         return Failed((f"{type(error).__name__}: {error}",))
 
 
@@ -150,12 +149,12 @@ class SumoProcesses:
     ) -> Played:
         """Returns a run; ``tell`` is told how far it is.
 
-        Raises Unwanted, after the process was killed, once the run is not wanted. Raises
+        Raises UnwantedError, after the process was killed, once the run is not wanted. Raises
         CorampError where the run fails.
         """
         while not self._free.acquire(timeout=LOOK_S):
             if not wanted():
-                raise Unwanted
+                raise UnwantedError
         try:
             process = self._taken()
             try:

@@ -36,21 +36,21 @@ def preset_words(scenario: Scenario) -> dict[str, str]:
 
 def share_percent(scenario: Scenario) -> float:
     """Returns which share of the vehicles that are expected is automated, in whole per cent."""
-    expected = [
-        (kind.share_of(on_ramp) * sum(stream.flows_veh_h), kind.name, on_ramp)
-        for on_ramp, stream in ((False, scenario.mainline), (True, scenario.ramp))
-        for kind in scenario.vehicle_types
-    ]
-    every = sum(flow for flow, _, _ in expected)
+    every = automated = 0.0
+    for on_ramp, stream in ((False, scenario.mainline), (True, scenario.ramp)):
+        for kind in scenario.vehicle_types:
+            flow = kind.share_of(on_ramp) * sum(stream.flows_veh_h)
+            every += flow
+            automated += flow * scenario.automated_share_of(kind.name, on_ramp)
     if every == 0.0:
         return 100.0 * scenario.traffic.share_of(False)
-    automated = sum(flow * scenario.automated_share_of(*of) for flow, *of in expected)
     return float(round(100.0 * automated / every))
 
 
 def with_share(scenario: Scenario, percent: float) -> Row:
     """Returns what to set so that a share of all vehicles is automated, of each stream and type."""
-    share, found = percent / 100.0, {}
+    share = percent / 100.0
+    found: Row = {}
     for stream in STREAMS:
         key = f"{stream}_automated_share"
         if getattr(scenario.traffic, key) is not None:
