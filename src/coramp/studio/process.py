@@ -113,9 +113,10 @@ def _make_runs(pipe: Connection, folder: str) -> None:
     """What the process does: it makes the runs that it is sent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl-c is for the server, which ends this
     tempfile.tempdir = folder
-    with suppress(EOFError, OSError):
+    with suppress(EOFError, OSError):  # the server has ended
         while True:
             pipe.send(_made(pipe.recv(), pipe))
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _made(spec: RunSpec, pipe: Connection) -> Played | Failed:
