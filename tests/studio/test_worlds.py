@@ -98,7 +98,12 @@ def test_the_page_is_told_in_which_world_figures_hold(answers):
     assert one["told"].startswith("share of 50 %, ")
     assert "vehicles automated, the others with fair drivers; preset mild (" in one["told"]
     assert "reports lost" in one["told"]
-    assert beside["told"].endswith("vehicles with fair drivers; preset mild")
+    assert beside["told"].endswith(
+        "vehicles with fair drivers; preset mild, of which nothing reaches vehicles that nobody "
+        "coordinates"
+    )
+    winter = told(answers, **HALF, preset="winter", strategy="uncontrolled:fair")["world"]
+    assert "preset winter, of which [road] reaches vehicles" in winter[0]["told"]
     plain = told(answers, horizon="30", second="nothing")["world"]
     assert plain[0]["told"].endswith("vehicles automated; a perfect world")
 
@@ -121,6 +126,7 @@ def test_automation_alone_stands_beside_it_at_the_same_share(answers):
         "automation alone, fair drivers",
     ]
     assert found["runs"][0]["automated"] == found["runs"][1]["automated"]
+    assert found["world"][1]["told"] == found["world"][0]["told"]
 
 
 @pytest.mark.parametrize(

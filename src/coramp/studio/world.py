@@ -9,11 +9,14 @@ from coramp.report.page.shown import title_of
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import PRESETS, TABLES
+from coramp.strategies.registry import strategy_named
 from coramp.studies.metric_labels import label_of, typeset
 from coramp.studies.tables import Table, number
 
 WORLD = "world"
 """The table that names the preset."""
+OF_THE_ROAD = ("road", "behaviour", "incidents")
+"""The tables that act on drivers too, and on automated vehicles that nobody coordinates."""
 PERFECT = "none"
 """The preset that stands for none."""
 PRESET_WORDS = {
@@ -66,7 +69,20 @@ def with_share(scenario: Scenario, percent: float) -> Row:
 def world_of(run: RunRecords) -> str:
     """Returns in words in which world the figures of a run hold, and what happened in it."""
     happened = told_of_world(run)
-    return f"{_kinds(run)}; {_faults(run.scenario)}{f' ({happened})' if happened else ''}"
+    faults = _faults(run.scenario)
+    if faults and not _coordinated(run):
+        faults += f", of which {_felt_alone(run.scenario)}"
+    return f"{_kinds(run)}; {faults or 'a perfect world'}{f' ({happened})' if happened else ''}"
+
+
+def _coordinated(run: RunRecords) -> bool:
+    return strategy_named(run.summary["strategy"]).cooperative
+
+
+def _felt_alone(scenario: Scenario) -> str:
+    """What SUMO's own vehicles feel of a world that fails; they send nothing and obey nobody."""
+    felt = [f"[{table}]" for table in OF_THE_ROAD if not getattr(scenario, table).is_perfect]
+    return f"{' and '.join(felt) or 'nothing'} reaches vehicles that nobody coordinates"
 
 
 def _kinds(run: RunRecords) -> str:
@@ -84,12 +100,12 @@ def _kinds(run: RunRecords) -> str:
 
 
 def _faults(scenario: Scenario) -> str:
-    """What of the world is not perfect."""
+    """What of the world is not perfect, empty where nothing is."""
     preset = scenario.world.preset
     of_preset = {WORLD, *PRESETS.get(preset or "", ())}
     own = [t for t in TABLES if t not in of_preset and not getattr(scenario, t).is_perfect]
     named = [f"preset {preset}"] if preset else []
-    return ", ".join([*named, *(f"[{table}]" for table in own)]) or "a perfect world"
+    return ", ".join([*named, *(f"[{table}]" for table in own)])
 
 
 def by_kind(runs: Sequence[RunRecords]) -> Table | None:
