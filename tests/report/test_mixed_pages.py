@@ -54,6 +54,16 @@ def test_a_report_does_not_call_it_a_proved_plan(folder):
     assert not any("drivers do not know of" in note for note in notes(coramp.load(folder)))
 
 
+def test_automation_alone_has_its_name_and_is_not_said_to_promise_anything():
+    half = {"traffic.automated_share": 0.5}
+    run = coramp.run("paper", "uncontrolled", horizon_s=120.0, seed=1, overrides=half)
+    assert run.summary["safety_violations"]
+    assert page_data(run)["title"] == "automation alone, fair drivers"
+    (note,) = notes(run)
+    assert "which vehicles that nobody coordinates do not know of" in note
+    assert "keep the distance to stop" not in note
+
+
 def test_lines_of_a_diagram_are_coloured_by_kind(folder):
     run = coramp.load(folder)
     (axes,) = run.plot_time_space().axes

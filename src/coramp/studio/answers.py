@@ -1,28 +1,59 @@
 """What the studio's page is told: runs as they are drawn, their figures, and a scenario to keep."""
 
 import json
+import math
 from collections import OrderedDict
-from collections.abc import Mapping
-from concurrent.futures import Future
-from contextlib import nullcontext
+from collections.abc import Generator, Mapping, Sequence
+from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from dataclasses import dataclass, field
-from threading import Lock
+from threading import Lock, Thread
 
 import tomli_w
 
 from coramp.errors import CorampError
-from coramp.records.run import RunRecords
+from coramp.records.schemas import Row
 from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
-from coramp.report.page.shown import page_data
+from coramp.report.page.shown import called, title_of
 from coramp.report.style import look_of
 from coramp.runs.running import RunSpec, recorded
-from coramp.studio.dials import DECIDING, NOTHING, Studio
+from coramp.studies.tables import Table
+from coramp.studio.dials import AUTOMATION, DECIDING, NOTHING, Studio
+from coramp.studio.process import Played, Simulated, SumoProcesses, played_from
+from coramp.studio.world import by_kind, folded, preset_words, world_of
 
-Played = tuple[RunRecords, str]
-"""A run, and what the page's scripts take for it."""
 KEPT_RUNS = 16
 """So many runs are remembered, so that going back to one shows it at once."""
+TICK_S = 0.1
+"""How often a page that waits is told how far its runs are."""
+
+
+@dataclass
+class Job:
+    """A run that is asked for: how many wait for it, and how far it is in SUMO."""
+
+    spec: RunSpec
+    waiting: int = 0
+    at: Simulated | None = None
+    played: "Future[Played]" = field(default_factory=Future)
+
+    def progress(self) -> Row:
+        """Returns for the page which run this is, how far it is and which share that is."""
+        spec, horizon_s = self.spec, self.spec.scenario.simulation.horizon_s
+        time_s = 0.0 if self.at is None else self.at.time_s
+        if self.played.done():
+            told = "done"
+        elif self.at is None:
+            told = "SUMO starts"
+        elif time_s == math.inf:
+            told = "simulated; figures are worked out"
+        elif time_s < horizon_s:
+            told = f"{time_s:.0f} of {horizon_s:.0f} s simulated"
+        else:
+            told = f"{time_s:.0f} s simulated; the last vehicles leave"
+        share = 1.0 if self.played.done() else min(1.0, time_s / horizon_s)
+        title = called(spec.strategy, spec.drivers, spec.scenario)
+        return {"title": title, "told": told, "share": share}
 
 
 @dataclass
@@ -31,8 +62,8 @@ class Answers:
 
     studio: Studio
     _lock: Lock = field(default_factory=Lock)
-    _sumo: Lock = field(default_factory=Lock)
-    _kept: OrderedDict[str, "Future[Played]"] = field(default_factory=OrderedDict)
+    _processes: SumoProcesses = field(default_factory=SumoProcesses)
+    _kept: OrderedDict[str, Job] = field(default_factory=OrderedDict)
 
     @property
     def saved_name(self) -> str:
@@ -53,25 +84,59 @@ class Answers:
             chosen=studio.chosen,
             start=studio.start,
             choices=[(name, _called(name)) for name in studio.choices],
+            among=studio.among_drivers,
+            presets=preset_words(studio.scenario),
+            drivers=list(studio.scenario.drivers),
             nothing=NOTHING,
             runs={},
             cells=[],
         )
 
     def runs(self, asked: Mapping[str, str]) -> str:
-        """Returns JSON of the runs that are asked for, or of ``errors``."""
+        """Returns JSON of the runs that are asked for, or of ``errors``; waits for them."""
+        *_, last = self.lines(asked)
+        return last
+
+    def lines(self, asked: Mapping[str, str]) -> Generator[str]:
+        """Yields lines of JSON: ``progress`` while SUMO runs, and the runs or ``errors`` at last.
+
+        A run in SUMO for which nobody waits any more is killed: close the iterator to leave it.
+        """
+        jobs: list[Job] = []
         try:
             specs = self.studio.specs(asked)
-            found = [self._run(spec) for spec in specs]
+            in_sumo_first = sorted(specs, key=lambda spec: spec.engine != "sumo")
+            jobs.extend(self._joined(spec) for spec in in_sumo_first)
+            while not _are_done(jobs):
+                yield json.dumps({"progress": [job.progress() for job in jobs]})
+                wait([job.played for job in jobs], TICK_S, FIRST_EXCEPTION)
+            played = {job.spec.run_id: job.played.result() for job in jobs}
+            yield self._told(specs, [played[spec.run_id] for spec in specs])
         except CorampError as error:
-            return json.dumps({"errors": [_plain(line) for line in error.messages]})
+            yield json.dumps({"errors": [_plain(line) for line in error.messages]})
+        finally:
+            self._leave(jobs)
+
+    def get_ready(self) -> None:
+        """Computes the first picture, and starts the processes that runs in SUMO will need."""
+        self.runs({})
+        self._processes.get_ready()
+
+    def close(self) -> None:
+        """Ends the processes of runs in SUMO."""
+        self._processes.close()
+
+    def _told(self, specs: Sequence[RunSpec], found: Sequence[Played]) -> str:
         runs = [run for run, _ in found]
-        table = comparison_table(runs)
+        kinds = by_kind(runs)
+        figures, more = folded(comparison_table(runs))
         told = {
+            "world": [{"title": title_of(run), "told": world_of(run)} for run in runs],
             "answer": " ".join(map(answer, runs)),
             "notes": [line for run in runs for line in notes(run)],
             "moved": _moved(specs[0]),
-            "table": {"title": table.title, "columns": table.columns, "rows": table.rows},
+            "tables": [_as_data(table) for table in (kinds, figures) if table],
+            "folded": [_as_data(more)] if more.rows else [],
             "command": self._command(specs[0]),
         }
         return f'{json.dumps(told)[:-1]}, "runs": [{",".join(text for _, text in found)}]}}'
@@ -85,30 +150,60 @@ class Answers:
             f"# Set in coramp studio; run it by\n# {self._command(spec)}\n{tomli_w.dumps(content)}"
         )
 
-    def _run(self, spec: RunSpec) -> Played:
-        """Returns a run; who asks for one that is under way waits for it, and nobody else does."""
+    def _joined(self, spec: RunSpec) -> Job:
+        """Returns a run's job, for which one more waits; begins it unless it is under way.
+
+        The exact engine runs at once, in this thread. SUMO runs in a process of its own.
+        """
         with self._lock:
             found = self._kept.get(spec.run_id)
-            asked = found or Future[Played]()
-            self._kept[spec.run_id] = asked
+            job = found or Job(spec)
+            job.waiting += 1
+            self._kept[spec.run_id] = job
             self._kept.move_to_end(spec.run_id)
             while len(self._kept) > KEPT_RUNS:
                 self._kept.popitem(last=False)
         if found is None:
-            try:
-                asked.set_result(self._played(spec))
-            except BaseException as error:
-                asked.set_exception(error)
-                with self._lock:
-                    self._kept.pop(spec.run_id, None)
-                raise
-        return asked.result()
+            if spec.engine == "sumo":
+                Thread(target=self._play, args=(job,), daemon=True).start()
+            else:
+                self._play(job)
+        return job
 
-    def _played(self, spec: RunSpec) -> Played:
-        # There is one SUMO in a process; the exact engine can run any number of times at once.
-        with self._sumo if spec.engine == "sumo" else nullcontext():
-            run = recorded(spec)
-        return run, json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
+    def _leave(self, jobs: Sequence[Job]) -> None:
+        with self._lock:
+            for job in jobs:
+                job.waiting -= 1
+
+    def _play(self, job: Job) -> None:
+        """Makes the run of a job, and forgets it unless it succeeds."""
+
+        def tell(at: Simulated) -> None:
+            job.at = at
+
+        try:
+            if job.spec.engine == "sumo":
+                played = self._processes.run(job.spec, tell, lambda: self._is_wanted(job))
+            else:
+                played = played_from(recorded(job.spec))
+            job.played.set_result(played)
+        except BaseException as error:
+            with self._lock:
+                self._forget(job)
+            job.played.set_exception(error)
+            if not isinstance(error, Exception):
+                raise
+
+    def _is_wanted(self, job: Job) -> bool:
+        """Whether somebody waits for a run; if not, nobody can any more."""
+        with self._lock:
+            if not job.waiting:
+                self._forget(job)
+            return job.waiting > 0
+
+    def _forget(self, job: Job) -> None:
+        if self._kept.get(job.spec.run_id) is job:
+            del self._kept[job.spec.run_id]
 
     def _command(self, spec: RunSpec) -> str:
         drivers = f" --drivers {spec.drivers}" if spec.drivers else ""
@@ -118,8 +213,22 @@ class Answers:
         )
 
 
+def _are_done(jobs: Sequence[Job]) -> bool:
+    """Whether all runs are made; raises what went wrong with one, whatever the others do."""
+    done = [job.played for job in jobs if job.played.done()]
+    for played in done:
+        played.result()
+    return len(done) == len(jobs)
+
+
+def _as_data(table: Table) -> Row:
+    return {"title": table.title, "columns": table.columns, "rows": table.rows}
+
+
 def _called(choice: str) -> str:
     """What a choice is called in figures and in the replay."""
+    if choice == AUTOMATION:
+        return "automation alone"
     strategy, _, drivers = choice.partition(":")
     return look_of(strategy, drivers or None).label
 

@@ -1,19 +1,19 @@
 """What can be set in the studio, its ranges, and the run that a setting asks for."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from coramp.equations.gaps import least_acceleration_mps2
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
-from coramp.road.streams import STREAMS
-from coramp.runs.running import RunSpec, make_spec
-from coramp.scenarios.checks import decision_station_range_m
+from coramp.runs.mixed import coordinates_drivers
+from coramp.runs.running import UNCONTROLLED, RunSpec, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
 from coramp.strategies.registry import strategies
+from coramp.studio.following import following
+from coramp.studio.world import PERFECT, PRESET_WORDS, share_percent, with_share
 
 NOTHING = "nothing"
 HORIZON_S = 300.0
@@ -61,6 +61,7 @@ DIALS = (
     Dial("mainline", "mainline.flow_veh_h", "mainline flow", "veh/h", 0.0, 4000.0, 50.0),
     Dial("ramp", "ramp.flow_veh_h", "ramp flow", "veh/h", 0.0, 1800.0, 25.0),
     Dial("lane", "ramp.acceleration_lane_m", "acceleration lane", "m", 50.0, 390.0, 5.0),
+    Dial("share", "", "automated vehicles", "%", 0.0, 100.0, 5.0),
     Dial("mainline_speed", "mainline.speed_mps", "mainline speed", "m/s", 12.0, 36.0, 0.5),
     Dial("ramp_speed", "ramp.speed_mps", "ramp speed", "m/s", 8.0, 34.0, 0.5),
     Dial("standstill", "safety.standstill_gap_m", "standstill gap", "m", 0.0, 5.0, 0.1),
@@ -68,10 +69,14 @@ DIALS = (
     Dial("horizon", "simulation.horizon_s", "time of arrivals", "s", 30.0, 1800.0, 30.0),
     Dial("seed", "", "seed", "", 0.0, 10_000.0, 1.0),
 )
-DECIDING = ("gap", "mainline", "ramp", "lane")
+DECIDING = ("gap", "mainline", "ramp", "lane", "share")
 """The dials that decide most; the page shows these at once and folds the others."""
 CHOICES = ("strategy", "second")
-USUAL_DRIVERS = "fair"
+WORLDS = ("preset", "drivers")
+"""What of the world is chosen from a list."""
+AMONG_DRIVERS = "mixed-slots"
+AUTOMATION = "automation"
+"""The choice of automated vehicles that nobody coordinates; others name their strategy."""
 
 
 @dataclass(frozen=True)
@@ -91,14 +96,19 @@ class Studio:
     def start(self) -> dict[str, float]:
         """Where each dial starts."""
         own = {dial.name: dial.value_of(self.scenario) for dial in DIALS if dial.key}
-        return {**own, "horizon": min(HORIZON_S, own["horizon"]), "seed": 1.0}
+        horizon_s = min(HORIZON_S, own["horizon"])
+        return {**own, "horizon": horizon_s, "share": share_percent(self.scenario), "seed": 1.0}
 
     @property
     def choices(self) -> list[str]:
-        """What may be chosen: cooperative strategies, then others with each kind of drivers."""
+        """What may be chosen: cooperative strategies, then others with each kind of drivers.
+
+        Those with a kind of drivers have nobody automated. Automation alone stands between.
+        """
         every = strategies().items()
         return [
             *(name for name, found in every if found.cooperative),
+            AUTOMATION,
             *(
                 f"{name}:{drivers}"
                 for name, found in every
@@ -108,21 +118,41 @@ class Studio:
         ]
 
     @property
+    def among_drivers(self) -> list[str]:
+        """Those of the choices that can run among drivers, or where the world fails."""
+        every = strategies()
+        return [n for n in self.choices if n not in every or coordinates_drivers(every[n])]
+
+    @property
     def chosen(self) -> dict[str, str]:
-        """What is chosen at first: a cooperative strategy, and drivers beside it."""
-        usual = f"uncontrolled:{USUAL_DRIVERS}"
-        drivers = [name for name in self.choices if name.startswith("uncontrolled:")]
-        second = usual if usual in drivers else next(iter(drivers), NOTHING)
-        return {"strategy": self.choices[0], "second": second}
+        """What is chosen at first: a cooperative strategy, drivers beside it, and the world."""
+        known = list(self.scenario.drivers)
+        usual = self.scenario.traffic.drivers
+        drivers = usual if usual in known else next(iter(known), usual)
+        return {
+            "strategy": AMONG_DRIVERS if _is_mixed(self.scenario) else self.choices[0],
+            "second": f"{UNCONTROLLED}:{drivers}" if known else NOTHING,
+            "preset": self.scenario.world.preset or PERFECT,
+            "drivers": drivers,
+        }
 
     def specs(self, asked: Mapping[str, str]) -> list[RunSpec]:
         """Returns the runs that an address asks for, one or two, on the same arrivals.
 
+        Without a strategy in the address it is the first, among drivers the one that can run there.
         Raises CorampError with a message for each thing that is wrong.
         """
         values = self._values(asked)
-        names = [asked.get(choice, self.chosen[choice]) for choice in CHOICES]
-        wanted = [name for name in dict.fromkeys(names) if name != NOTHING]
+        self._check_world(asked)
+        chosen = {**self.chosen, **{name: asked[name] for name in WORLDS if name in asked}}
+        if "drivers" in asked:
+            chosen["second"] = f"{UNCONTROLLED}:{chosen['drivers']}"
+        overrides = self._overrides(values, chosen["preset"])
+        world = load_scenario(self.source, overrides, dict.fromkeys(overrides, "studio"))
+        if _is_mixed(world):
+            chosen["strategy"] = AMONG_DRIVERS
+        chosen |= {name: asked[name] for name in CHOICES if name in asked}
+        wanted = [chosen[name] for name in CHOICES if chosen[name] != NOTHING]
         if not wanted:
             raise CorampError("strategy: nothing is chosen; choose one")
         for name in wanted:
@@ -130,15 +160,46 @@ class Studio:
                 raise CorampError(
                     f"strategy: there is no {name!r}; allowed are {', '.join(self.choices)}"
                 )
-        overrides = self._overrides(values)
-        return [_spec(self.source, name, overrides, int(values["seed"])) for name in wanted]
+        if not world.has_automated:
+            alone = f"{UNCONTROLLED}:{chosen['drivers']}"
+            wanted = [alone if name in {AMONG_DRIVERS, AUTOMATION} else name for name in wanted]
+        return [
+            self._spec(name, world, overrides, chosen["drivers"], int(values["seed"]))
+            for name in dict.fromkeys(wanted)
+        ]
+
+    def _spec(self, name: str, world: Scenario, overrides: Row, drivers: str, seed: int) -> RunSpec:
+        """The run of a choice in a world that the overrides make of the scenario."""
+        strategy, _, own_drivers = name.partition(":")
+        shares: Row = {}
+        if own_drivers and world.gives_shares:
+            shares = with_share(world, 0.0)
+        elif name == AUTOMATION and not world.gives_shares:
+            shares = with_share(world, 100.0)
+        in_sumo = bool(own_drivers) or name == AUTOMATION or _is_mixed(world)
+        return make_spec(
+            self.source,
+            UNCONTROLLED if name == AUTOMATION else strategy,
+            engine="sumo" if in_sumo else "exact",
+            drivers=(own_drivers or drivers) if in_sumo else None,
+            overrides={**overrides, **shares},
+            seed=seed,
+            blamed="studio",
+        )
+
+    def _check_world(self, asked: Mapping[str, str]) -> None:
+        allowed = {"preset": list(PRESET_WORDS), "drivers": list(self.scenario.drivers)}
+        for name, known in allowed.items():
+            if name in asked and asked[name] not in known:
+                raise CorampError(
+                    f"{name}: there is no {asked[name]!r}; allowed are {', '.join(known)}"
+                )
 
     def _values(self, asked: Mapping[str, str]) -> dict[str, float]:
         known = {dial.name: dial for dial in self.dials}
-        if strange := [name for name in asked if name not in known and name not in CHOICES]:
-            raise CorampError(
-                f"{strange[0]}: cannot be set here; allowed are {', '.join([*known, *CHOICES])}"
-            )
+        every = (*known, *CHOICES, *WORLDS)
+        if strange := [name for name in asked if name not in every]:
+            raise CorampError(f"{strange[0]}: cannot be set here; allowed are {', '.join(every)}")
         values = dict(self.start)
         problems: list[str] = []
         for name in known.keys() & asked.keys():
@@ -152,77 +213,23 @@ class Studio:
             raise CorampError(f"seed: {values['seed']:g} is not whole; allowed is a whole number")
         return values
 
-    def _overrides(self, values: Mapping[str, float]) -> Row:
+    def _overrides(self, values: Mapping[str, float], preset: str) -> Row:
+        world: Row = {}
+        if preset != self.chosen["preset"]:
+            world["world.preset"] = None if preset == PERFECT else preset
+        if values["share"] != self.start["share"]:
+            world |= with_share(self.scenario, values["share"])
         changed = {
             dial.key: values[dial.name]
             for dial in DIALS
             if dial.key and values[dial.name] != dial.value_of(self.scenario)
         }
-        return {**changed, **dict(_following(self.scenario, changed))}
+        return {**changed, **dict(following(self.scenario, changed)), **world}
 
 
-def _following(scenario: Scenario, changed: Mapping[str, float]) -> Iterator[tuple[str, Any]]:
-    """What must follow a change, so that a slider does not run into the scenario's own checks.
-
-    Entry speeds and limits keep their ratio to the speed of their stream. The decision station and
-    the ordinary acceleration move no further than the changed road asks (Eq. 22).
-    """
-    for stream in STREAMS:
-        speed_mps = changed.get(f"{stream}.speed_mps")
-        if speed_mps is None:
-            continue
-        own = getattr(scenario, stream)
-        ratio = speed_mps / own.speed_mps
-        yield f"{stream}.limit_mps", round(own.limit_mps * ratio, 6)
-        low, high = own.entry_speed_mps
-        yield f"{stream}.entry_speed_mps", [round(low * ratio, 6), round(high * ratio, 6)]
-    road = {"mainline.speed_mps", "ramp.speed_mps", "ramp.acceleration_lane_m"}
-    if road & changed.keys():
-        yield from _planning(scenario, changed)
-
-
-def _planning(scenario: Scenario, changed: Mapping[str, float]) -> Iterator[tuple[str, Any]]:
-    v0 = changed.get("mainline.speed_mps", scenario.mainline.speed_mps)
-    ramp_mps = changed.get("ramp.speed_mps", scenario.ramp.speed_mps)
-    lane_m = changed.get("ramp.acceleration_lane_m", scenario.ramp.acceleration_lane_m)
-    if ramp_mps >= v0:
-        return
-    ratio = ramp_mps / scenario.ramp.speed_mps
-    mainline = scenario.mainline.model_copy(update={"speed_mps": v0})
-    ramp = scenario.ramp.model_copy(
-        update={
-            "speed_mps": ramp_mps,
-            "limit_mps": scenario.ramp.limit_mps * ratio,
-            "acceleration_lane_m": lane_m,
-        }
-    )
-    road = scenario.model_copy(update={"mainline": mainline, "ramp": ramp})
-    if road.last_merge_station_m <= 0.0:
-        return
-    first_m, last_m = decision_station_range_m(road)
-    own_m = scenario.ramp.decision_station_m
-    if own_m is not None and first_m <= last_m and not first_m <= own_m <= last_m:
-        inside = (
-            math.ceil(10.0 * first_m) / 10.0 if own_m < first_m else math.floor(10 * last_m) / 10
-        )
-        yield "ramp.decision_station_m", inside
-    least = least_acceleration_mps2(v0, ramp_mps, road.last_merge_station_m)
-    own_mps2 = scenario.motion.free_acceleration_mps2
-    if own_mps2 < least <= scenario.motion.ramp_acceleration_mps2:
-        yield "motion.free_acceleration_mps2", math.ceil(1000.0 * least) / 1000.0
-
-
-def _spec(source: str, name: str, overrides: Row, seed: int) -> RunSpec:
-    strategy, _, drivers = name.partition(":")
-    return make_spec(
-        source,
-        strategy,
-        engine="sumo" if drivers else "exact",
-        drivers=drivers or None,
-        overrides=overrides,
-        seed=seed,
-        blamed="studio",
-    )
+def _is_mixed(scenario: Scenario) -> bool:
+    """Whether only SUMO has this world: with drivers, or where something goes wrong."""
+    return scenario.is_mixed or scenario.has_faults
 
 
 def studio_of(source: str) -> Studio:

@@ -1,12 +1,13 @@
 """The studio's server: this machine only, three addresses, nothing kept."""
 
 import errno
+import select
 import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
@@ -19,7 +20,7 @@ from coramp.studio.dials import studio_of
 HOST = "127.0.0.1"
 READ_S = 10.0
 """So long a client may take to send a request, and to take a piece of the answer."""
-HTML, JSON, TOML = "text/html", "application/json", "application/toml"
+HTML, LINES, TOML = "text/html", "application/x-ndjson", "application/toml"
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -64,6 +65,11 @@ class StudioServer(ThreadingHTTPServer):
                 with suppress(OSError):
                     connection.shutdown(socket.SHUT_RDWR)
 
+    def server_close(self) -> None:
+        """Gives the port back, and ends the processes of runs in SUMO."""
+        super().server_close()
+        self.answers.close()
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that went away is no error; says anything else in one line."""
         del request, client_address
@@ -75,7 +81,7 @@ class StudioServer(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     server: StudioServer
     protocol_version = "HTTP/1.1"
-    paths: ClassVar[dict[str, str]] = {"/": HTML, "/runs": JSON, "/scenario.toml": TOML}
+    paths: ClassVar[dict[str, str]] = {"/": HTML, "/runs": LINES, "/scenario.toml": TOML}
     timeout = READ_S
 
     def handle_one_request(self) -> None:
@@ -101,27 +107,41 @@ class _Handler(BaseHTTPRequestHandler):
         kind = self.paths.get(asked.path)
         if kind is None:
             return self._send(HTTPStatus.NOT_FOUND, "text/plain", "there is no such page\n")
+        answers = self.server.answers
+        if kind == LINES:
+            return self._send_lines(answers.lines(settings))
         try:
-            text = self._answer(asked.path, settings)
+            text = answers.scenario_toml(settings) if kind == TOML else answers.page()
         except CorampError as error:
             return self._send(HTTPStatus.BAD_REQUEST, "text/plain", "\n".join(error.messages))
         return self._send(HTTPStatus.OK, kind, text)
 
-    def _answer(self, path: str, asked: dict[str, str]) -> str:
-        answers = self.server.answers
-        match path:
-            case "/runs":
-                return answers.runs(asked)
-            case "/scenario.toml":
-                return answers.scenario_toml(asked)
-            case _:
-                return answers.page()
-
     def _send(self, status: HTTPStatus, kind: str, text: str) -> None:
         content = text.encode()
+        self._send_head(status, kind, ("Content-Length", str(len(content))))
+        self.wfile.write(content)
+
+    def _send_lines(self, lines: Generator[str]) -> None:
+        """Sends each line as soon as it is there; leaves off once the client has gone away."""
+        self._send_head(HTTPStatus.OK, LINES, ("Transfer-Encoding", "chunked"))
+        with closing(lines):
+            for line in lines:
+                if self._has_gone():
+                    self.close_connection = True
+                    return
+                content = f"{line}\n".encode()
+                self.wfile.write(b"%x\r\n%b\r\n" % (len(content), content))
+        self.wfile.write(b"0\r\n\r\n")
+
+    def _has_gone(self) -> bool:
+        """Whether the client has closed its side; what it sends meanwhile stays unread."""
+        readable, _, _ = select.select([self.connection], [], [], 0.0)
+        return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+
+    def _send_head(self, status: HTTPStatus, kind: str, length: tuple[str, str]) -> None:
         self.send_response(status)
         self.send_header("Content-Type", f"{kind}; charset=utf-8")
-        self.send_header("Content-Length", str(len(content)))
+        self.send_header(*length)
         self.send_header("Content-Security-Policy", POLICY)
         self.send_header("X-Content-Type-Options", "nosniff")
         self.send_header("Cache-Control", "no-store")
@@ -131,7 +151,6 @@ class _Handler(BaseHTTPRequestHandler):
             name = self.server.answers.saved_name
             self.send_header("Content-Disposition", f'attachment; filename="{name}.toml"')
         self.end_headers()
-        self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the library names it
         """Says nothing of what goes well."""
@@ -144,7 +163,7 @@ def serve(scenario: str, port: int, say: Callable[[str], None]) -> None:
     """
     with StudioServer(scenario, port) as server:
         # The first picture is computed while the browser opens.
-        threading.Thread(target=server.answers.runs, args=({},), daemon=True).start()
+        threading.Thread(target=server.answers.get_ready, daemon=True).start()
         say(server.address)
         try:
             server.serve_forever()

@@ -214,16 +214,17 @@ def notes(run: RunRecords) -> list[str]:
     broken = broken_promises(row)
     if broken:
         found.append(f"Unsafe, {title_of(run)}: {'; '.join(broken)}.")
-    if run.is_mixed and row["safety_violations"]:
+    if run.is_mixed and row["safety_violations"] and row["plan_error_m"] is not None:
         found.append(
             f"{title_of(run)}: {row['safety_violations']} pairs came nearer than the safe distance "
             "of Eq. 1, 15 and 16; they are ringed below. Neither drivers nor automated vehicles "
             "among them keep it: these keep the distance to stop behind a leader that brakes."
         )
     elif row["safety_violations"] and not broken:
+        who = "vehicles that nobody coordinates" if run.is_mixed else "their drivers"
         found.append(
             f"{title_of(run)}: {row['safety_violations']} pairs came nearer than the safe distance "
-            "of Eq. 1, 15 and 16, which their drivers do not know of; they are ringed below."
+            f"of Eq. 1, 15 and 16, which {who} do not know of; they are ringed below."
         )
     return found
 

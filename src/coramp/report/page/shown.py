@@ -12,6 +12,7 @@ from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.records.world_told import HAPPENED
 from coramp.report.style import look_of
+from coramp.runs.running import UNCONTROLLED
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import CAR
 from coramp.worlds.sumo.network import LANE_WIDTH_M, ramp_shape_m, road_plan
@@ -23,7 +24,14 @@ DIGITS = (4, 4, 6, 7)
 
 def title_of(run: RunRecords) -> str:
     """Returns what the run is called beside others on the same arrivals."""
-    return look_of(run.content["strategy"], run.content["drivers"]).label
+    return called(run.content["strategy"], run.content["drivers"], run.scenario)
+
+
+def called(strategy: str, drivers: str | None, scenario: Scenario) -> str:
+    """Returns what a strategy is called in a scenario, whose vehicles may be automated alone."""
+    if strategy == UNCONTROLLED and scenario.gives_shares and scenario.has_automated:
+        return f"automation alone, {drivers} drivers" if scenario.is_mixed else "automation alone"
+    return look_of(strategy, drivers).label
 
 
 def page_data(run: RunRecords) -> Row:

@@ -66,7 +66,10 @@ def _run_cooperative(
         )
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
         with Session(
-            [*files.options(), "--insertion-checks", "none"], rules.control.step_s, options.gui
+            [*files.options(), "--insertion-checks", "none"],
+            rules.control.step_s,
+            options.gui,
+            options.tell,
         ) as session:
             plant = CooperativePlant(session, plan.lane_starts_m(), rules)
             channel = Channel(plant)

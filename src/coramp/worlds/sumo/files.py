@@ -2,7 +2,7 @@
 
 import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,11 +40,15 @@ class Samples:
 
 @dataclass(frozen=True)
 class SumoOptions:
-    """How a run is watched: files kept in a folder, a window, messages kept in the outcome."""
+    """How a run is watched: files kept in a folder, a window, messages kept in the outcome.
+
+    ``tell`` is told, while SUMO runs, the time (s) that is simulated, and infinity at its end.
+    """
 
     keep_in: Path | None = None
     gui: bool = False
     keep_messages: bool = False
+    tell: Callable[[float], None] | None = None
 
 
 class RunFiles:

@@ -53,7 +53,7 @@ def run_mixed(
         actuators = actuators_of(scenario, len(arrivals))
         types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
-        with Session(files.options(), step_s, options.gui) as session:
+        with Session(files.options(), step_s, options.gui, options.tell) as session:
             plant = MixedPlant(
                 session,
                 plan.lane_starts_m(),

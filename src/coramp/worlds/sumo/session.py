@@ -7,7 +7,7 @@ are at step n - 1. What is commanded then governs the way from there to step n.
 import math
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -34,6 +34,8 @@ ACTION_S = 1.0
 In between it keeps its acceleration, which is what its pieces ask for; each command makes it act
 at once. That more than halves the time of a simulation step.
 """
+TOLD_S = 5.0
+"""At most so long is simulated before a session tells how far it is."""
 
 
 class Session:
@@ -42,13 +44,24 @@ class Session:
     _free = threading.Lock()
     _owner: int | None = None
 
-    def __init__(self, options: Sequence[str], step_s: float, gui: bool = False) -> None:
-        """Starts SUMO; libsumo runs one simulation a process, so other threads wait for it."""
+    def __init__(
+        self,
+        options: Sequence[str],
+        step_s: float,
+        gui: bool = False,
+        tell: Callable[[float], None] | None = None,
+    ) -> None:
+        """Starts SUMO; libsumo runs one simulation a process, so other threads wait for it.
+
+        ``tell`` is told, while SUMO runs, the time (s) that is simulated, and infinity at its end.
+        """
         if Session._owner == threading.get_ident():
             raise CorampError("SUMO: one simulation a process; the other one still runs")
         if gui and not os.environ.get("DISPLAY"):
             raise CorampError("--gui: there is no screen (DISPLAY is not set); run without --gui")
         self._step_s = step_s
+        self._tell = tell
+        self._done = 0
         program = sumo_binary("sumo-gui" if gui else "sumo")
         extra = ("--start", "--quit-on-end") if gui else ()
         Session._free.acquire()
@@ -75,13 +88,25 @@ class Session:
         finally:
             Session._owner = None
             Session._free.release()
+        if self._tell is not None and error is None:
+            self._tell(math.inf)
 
     def step_to(self, step: int) -> None:
         """Executes all steps before ``step``; raises CorampError where SUMO gives up."""
         try:
+            if self._tell is not None:
+                self._step_telling(step, self._tell)
             libsumo.simulationStep(step * self._step_s)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise CorampError(f"SUMO: {error}") from error
+
+    def _step_telling(self, step: int, tell: Callable[[float], None]) -> None:
+        """Executes steps before ``step``, but not the last, and tells how far it is."""
+        for done in range(self._done, step, max(1, round(TOLD_S / self._step_s))):
+            if done > self._done:
+                libsumo.simulationStep(done * self._step_s)
+            tell(done * self._step_s)
+        self._done = step
 
     def step_on(self) -> None:
         """Executes one step."""

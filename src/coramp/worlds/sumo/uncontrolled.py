@@ -62,7 +62,7 @@ def run_uncontrolled(
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
             files.write_loops(loops(scenario, look_steps * step_s))
-        with Session(files.options(), step_s, options.gui) as session:
+        with Session(files.options(), step_s, options.gui, options.tell) as session:
             road = DriversInSumo(session, plan.lane_starts_m(), step_s)
             meter = Meter(session, step_s) if metered else None
             service = Service(
