@@ -5,6 +5,10 @@ from coramp.records.run import RunRecords
 HAPPENED = {
     "vehicle breaks down": ("vehicle broke down", "vehicles broke down"),
     "driver brakes for nothing": ("driver braked for nothing", "drivers braked for nothing"),
+    "positioning fails": ("outage of positioning", "outages of positioning"),
+    "vehicle falls silent": ("vehicle fell silent", "vehicles fell silent"),
+    "vehicle disobeys": ("vehicle disobeyed", "vehicles disobeyed"),
+    "vehicle lies": ("vehicle lied about its station", "vehicles lied about their stations"),
 }
 """Events of the world itself, one and several of them."""
 

@@ -11,6 +11,7 @@ from coramp.explain.story import quantities_in, told, tried_in
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.records.world_told import HAPPENED
+from coramp.report.page.heard_shown import heard_data
 from coramp.report.style import look_of
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import CAR
@@ -41,12 +42,13 @@ def page_data(run: RunRecords) -> Row:
     last_s = max([exit_s for exit_s in exits_s if exit_s is not None], default=0.0)
     simulation = run.scenario.simulation
     capped = any(exit_s is None for exit_s in exits_s)
+    end_s = simulation.horizon_s + simulation.drain_s if capped else last_s
     return {
         "title": title_of(run),
         "strategy": run.summary["strategy"],
         "drivers": run.summary["drivers"],
         "seed": run.summary["seed"],
-        "end_s": simulation.horizon_s + simulation.drain_s if capped else last_s,
+        "end_s": end_s,
         "road": road_data(run.scenario),
         "safety": run.scenario.safety.model_dump(mode="json"),
         "ids": ids,
@@ -75,6 +77,7 @@ def page_data(run: RunRecords) -> Row:
             for row in _rows(run.violations)
         ],
         "events": _events(run, place_of),
+        "heard": heard_data(run, place_of, end_s),
     }
 
 

@@ -40,11 +40,15 @@ class Samples:
 
 @dataclass(frozen=True)
 class SumoOptions:
-    """How a run is watched: files kept in a folder, a window, messages kept in the outcome."""
+    """How a run is watched: files kept in a folder, a window, messages kept in the outcome.
+
+    ``keep_heard`` keeps what the coordinator of mixed traffic knew in a world that fails.
+    """
 
     keep_in: Path | None = None
     gui: bool = False
     keep_messages: bool = False
+    keep_heard: bool = False
 
 
 class RunFiles:
