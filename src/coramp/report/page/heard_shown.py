@@ -6,6 +6,7 @@ import numpy as np
 import polars as pl
 
 from coramp.mixed.laws import FollowingLaw, SafetyLaw
+from coramp.records.lapses import period_s
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 
@@ -13,7 +14,6 @@ FALLBACK, UNKNOWN, REPORT_LOST, COMMAND_LOST, ON_MAINLINE = 1, 2, 4, 8, 16
 """Bits of a row's last number."""
 ERROR_M, AGE_S = 0.3, 0.3
 """A row whose error and age are this near to those of the last row kept is left out."""
-USUAL_PERIOD_S = 0.2
 
 
 def heard_data(run: RunRecords, place_of: Mapping[str, int], end_s: float) -> Row | None:
@@ -27,15 +27,14 @@ def heard_data(run: RunRecords, place_of: Mapping[str, int], end_s: float) -> Ro
     heard = run.heard
     if heard is None:
         return None
-    times_s = heard["time_s"].unique().sort().to_numpy()
-    period_s = float(np.diff(times_s).min()) if len(times_s) > 1 else USUAL_PERIOD_S
+    step_s = period_s(heard)
     marked = heard.with_columns(
         place=pl.col("vehicle_id").replace_strict(place_of, return_dtype=pl.Int64), bits=_bits()
     ).sort("place", "time_s")
     first, rows = [0], list[float]()
     by_place = {key[0]: frame for key, frame in marked.partition_by("place", as_dict=True).items()}
     for place in range(len(place_of)):
-        rows += _rows_of(by_place[place], period_s) if place in by_place else []
+        rows += _rows_of(by_place[place], step_s) if place in by_place else []
         first.append(len(rows) // 4)
     law = SafetyLaw().on(run.scenario.road.assumed_braking_mps2)
     return {
@@ -61,20 +60,20 @@ def _bits() -> pl.Expr:
     return pl.sum_horizontal(*(flag.cast(pl.Int64) * bit for bit, flag in bits.items()))
 
 
-def _rows_of(own: pl.DataFrame, period_s: float) -> list[float]:
+def _rows_of(own: pl.DataFrame, step_s: float) -> list[float]:
     """The rows of one vehicle that tell something new, and where all is known again."""
     kept = list[float]()
     columns = own.select("time_s", pl.col("error_m", "age_s").fill_null(0.0), "bits")
     last, ends_s = (0.0, 0.0, 0.0, 0), -1.0
     for time_s, error_m, age_s, bits in columns.iter_rows():
-        after_a_gap = time_s > ends_s + 0.5 * period_s
+        after_a_gap = time_s > ends_s + 0.5 * step_s
         if after_a_gap and ends_s >= 0.0:
             kept += [round(ends_s, 3), 0, 0, 0]
         differs = abs(error_m - last[1]) > ERROR_M or abs(age_s - last[2]) >= AGE_S
         if after_a_gap or differs or bits != last[3]:
             kept += [round(time_s, 3), round(error_m, 2), round(age_s, 2), bits]
             last = (time_s, error_m, age_s, bits)
-        ends_s = time_s + period_s
+        ends_s = time_s + step_s
     return [*kept, round(ends_s, 3), 0, 0, 0]
 
 

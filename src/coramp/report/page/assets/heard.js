@@ -116,20 +116,22 @@ coramp.knownOf = (run, i, time) => {
   return told;
 };
 
-// Where the coordinator takes a vehicle to be: a dashed outline, joined to the vehicle, with a bar
-// over where it may be by then.
+// Where the coordinator takes a vehicle to be: a dashed outline, with an arrow from the vehicle where
+// both are apart, and below it a bar over where it may be by then.
 coramp.drawKnown = (ctx, road, row, vehicle, known) => {
   const { run } = road;
   const high = coramp.Road.BODY * road.lane;
   const y = road.y(row, known.station, known.onMainline);
-  const [x, low, far] = [known.station, known.low, known.high].map((m) => road.x(row, m));
+  const [x, low, far, own] = [known.station, known.low, known.high, vehicle.station].map((m) => road.x(row, m));
+  const long = run.length[vehicle.i] * road.scale;
   ctx.save();
   ctx.strokeStyle = coramp.colour('ghost');
   ctx.lineWidth = 1.6;
   ctx.setLineDash([3, 2]);
-  ctx.strokeRect(x - run.length[vehicle.i] * road.scale, y - 0.5 * high - 2, run.length[vehicle.i] * road.scale, high + 4);
+  ctx.strokeRect(x - long, y - 0.5 * high - 2, long, high + 4);
   ctx.setLineDash([]);
-  const bar = y + 0.5 * high + 3.5;
+  if (Math.abs(x - own) > long + 5) coramp.arrow(ctx, x > own ? [own, x - long] : [own - long, x], y);
+  const bar = y + 0.5 * high + 2.5 + 2.5 * (vehicle.i % 2);
   ctx.lineWidth = 2;
   ctx.beginPath();
   ctx.moveTo(low, bar);
@@ -137,6 +139,19 @@ coramp.drawKnown = (ctx, road, row, vehicle, known) => {
   for (const end of [low, far]) { ctx.moveTo(end, bar - 2.5); ctx.lineTo(end, bar + 2.5); }
   ctx.stroke();
   ctx.restore();
+};
+
+// An arrow between two places of a row.
+coramp.arrow = (ctx, [from, to], y) => {
+  const way = Math.sign(to - from);
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  ctx.moveTo(from, y);
+  ctx.lineTo(to, y);
+  ctx.moveTo(to - 4 * way, y - 3);
+  ctx.lineTo(to, y);
+  ctx.lineTo(to - 4 * way, y + 3);
+  ctx.stroke();
 };
 
 // Signs above a vehicle: broken down, in fallback, not known, messages just lost.

@@ -61,7 +61,9 @@ coramp.Replay = class {
         + `row below. ${coramp.Replay.KEYS}`),
       element('div', { class: 'tools' },
         element('label', {}, 'view ', this.views), element('label', {}, 'enlarged ', this.zooms),
-        element('label', {}, this.distances, ' safe distances')));
+        element('label', {}, this.distances, ' safe distances'),
+        this.runs.some((run) => coramp.lapses(run).length) ? element('button', { type: 'button',
+          onclick: () => this.nextLapse() }, 'next fallback or lost sight') : null));
     new ResizeObserver(() => this.draw()).observe(this.place);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
     const listener = (event) => {
@@ -174,6 +176,22 @@ coramp.Replay = class {
     const at = there.indexOf(run.indexOf.get(this.selected));
     const place = at < 0 ? (by > 0 ? 0 : there.length - 1) : (at + by + there.length) % there.length;
     this.choose(run, there[place]);
+  }
+
+  // Goes to the next time at which a vehicle near the merge fell back or was not known.
+  nextLapse() {
+    const [from, to] = [-200, this.runs[0].road.lane_m];
+    const near = (run, { vehicle, from: time }) => {
+      const { station } = coramp.state(run, vehicle, time);
+      return station > from && station < to;
+    };
+    const found = this.runs.flatMap((run) => coramp.lapses(run).filter((lapse) => near(run, lapse))
+      .map((lapse) => ({ run, ...lapse })));
+    const next = found.find((lapse) => lapse.from > this.time + 0.05) ?? found[0];
+    if (!next) return;
+    this.pause();
+    this.seek(next.from + 0.2);
+    this.choose(next.run, next.vehicle);
   }
 
   look() {
