@@ -141,8 +141,9 @@ def test_there_is_nothing_to_audit(folder):
     assert_refused(refused)
     assert refused.errors == [
         (
-            f"Error: {folder}: automated vehicles drove among drivers here, and no messages were "
-            "kept; audit a run of automated vehicles alone, or of drivers alone"
+            f"Error: {folder}: automated vehicles drove among drivers here, and such runs keep no "
+            "log that an audit could repeat; audit a run of automated vehicles alone, or of "
+            "drivers alone"
         )
     ]
 

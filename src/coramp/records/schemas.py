@@ -163,6 +163,8 @@ ON_BOARD: Schema = {
     "rear_gap_m": pl.Float64,
     "rear_speed_mps": pl.Float64,
     "changes_lane": pl.Boolean,
+    "ahead_m": pl.Float64,
+    "ahead_mps": pl.Float64,
 }
 
 SPEEDS: Schema = {

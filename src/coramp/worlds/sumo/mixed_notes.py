@@ -19,7 +19,7 @@ from coramp.worlds.sumo.files import SumoOptions
 
 COLUMNS = (
     *("time_s", "vehicle", "station_m", "speed_mps", "on_mainline", "law", "accel_mps2"),
-    *("told_mps2", "given_s", "fallback", "place", "after", "changes"),
+    *("told_mps2", "given_s", "fallback", "place", "after", "changes", "ahead_m", "ahead_mps"),
     *("leader", "leader_gap_m", "leader_speed_mps"),
     *("front", "front_gap_m", "front_speed_mps"),
     *("rear", "rear_gap_m", "rear_speed_mps"),
@@ -64,6 +64,8 @@ class OnBoardRecord:
                 place[number],
                 after[number],
                 changes,
+                np.where(users.automated, ahead.way_m, np.nan),
+                np.where(users.automated, ahead.speed_mps, np.nan),
                 *_neighbour(users, around.leader, around.leader >= 0),
                 *_neighbour(users, around.front, beside & (around.front >= 0)),
                 *_follower(users, around.rear, beside & (around.rear >= 0)),
