@@ -143,7 +143,7 @@ def known_lines(
     told = {name: _known(run, drove, name, time_s) for name in vehicle_ids}
     exact = [name for name, line in told.items() if not line]
     lines = [f"{name}: {line}" for name, line in told.items() if line]
-    return [*lines, *([f"known as now: {', '.join(exact)}"] if exact else [])]
+    return [*lines, *([f"known exactly: {', '.join(exact)}"] if exact else [])]
 
 
 def _known(run: RunRecords, drove: Drove, vehicle_id: str, time_s: float) -> str:
