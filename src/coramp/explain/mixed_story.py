@@ -16,7 +16,7 @@ from coramp.records.schemas import Row
 from coramp.strategies.registry import strategy_named
 
 SHORTEST_S = 0.7
-"""What lasts less than this is told with what came before it, but for lane changes."""
+"""What lasts less is told with what came before it, but for lane changes and fallbacks."""
 
 
 @dataclass(frozen=True)
@@ -64,18 +64,38 @@ def mixed_story_in(run: RunRecords, vehicle_id: str, folder: Path | None = None)
             "not kept; run again with --keep-messages"
         )
     drove = Drove(run)
-    chapters = [*_chapters(run, drove, vehicle_id), *_events(run, vehicle_id)]
+    chapters = [*_chapters(run, run.on_board, drove, vehicle_id), *_events(run, vehicle_id)]
     chapters.sort(key=lambda chapter: chapter.from_s)
     told = {key: run.content[key] for key in ("scenario", "strategy", "seed", "run_id")}
     return MixedStory(vehicle, assumed(drove), chapters, told)
 
 
-def _chapters(run: RunRecords, drove: Drove, vehicle_id: str) -> list[MixedChapter]:
-    own = pl.DataFrame() if run.on_board is None else run.on_board
-    rows = own.filter(vehicle_id=vehicle_id).sort("time_s").rows(named=True)
-    step_s = period_s(own)
-    blocks = _joined([list(group) for _, group in groupby(rows, key=_key)], step_s)
-    return [_chapter(run, drove, block, step_s) for block in blocks]
+def acts_of(run: RunRecords) -> dict[str, list[tuple[float, float, str]]] | None:
+    """Returns what each vehicle did from when to when (s), None where that was not kept."""
+    if run.on_board is None:
+        return None
+    drove, step_s = Drove(run), period_s(run.on_board)
+    of_each = run.on_board.sort("vehicle_id", "time_s").partition_by("vehicle_id")
+    return {
+        own["vehicle_id"][0]: [
+            (block[0]["time_s"], round(block[-1]["time_s"] + step_s, 3), done(block[0], drove))
+            for block in _blocks(own.rows(named=True), step_s)
+        ]
+        for own in of_each
+    }
+
+
+def _chapters(
+    run: RunRecords, on_board: pl.DataFrame, drove: Drove, vehicle_id: str
+) -> list[MixedChapter]:
+    rows = on_board.filter(vehicle_id=vehicle_id).sort("time_s").rows(named=True)
+    step_s = period_s(on_board)
+    return [_chapter(run, drove, block, step_s) for block in _blocks(rows, step_s)]
+
+
+def _blocks(rows: Sequence[Row], step_s: float) -> list[list[Row]]:
+    """The decisions of a vehicle, those together that are alike to tell."""
+    return _joined([list(group) for _, group in groupby(rows, key=_key)], step_s)
 
 
 def _key(row: Row) -> tuple[object, ...]:
@@ -89,14 +109,18 @@ def _joined(blocks: Sequence[list[Row]], step_s: float) -> list[list[Row]]:
     """Blocks of decisions that are alike; short ones are joined to the one before."""
     joined: list[list[Row]] = []
     for block in blocks:
-        short = len(block) * step_s < SHORTEST_S and not block[0]["changes_lane"]
         last = joined[-1] if joined else None
-        alike = last is not None and _key(last[0]) == _key(block[0])
-        if last is not None and not last[0]["changes_lane"] and (short or alike):
+        short = len(block) * step_s < SHORTEST_S
+        if last is not None and (_key(last[0]) == _key(block[0]) or (short and _like(last, block))):
             last.extend(block)
         else:
             joined.append(list(block))
     return joined
+
+
+def _like(last: Sequence[Row], block: Sequence[Row]) -> bool:
+    """Whether two blocks do not differ in what is told however short it is."""
+    return all(last[0][name] == block[0][name] for name in ("changes_lane", "fallback"))
 
 
 def _chapter(run: RunRecords, drove: Drove, block: Sequence[Row], step_s: float) -> MixedChapter:

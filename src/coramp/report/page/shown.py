@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from coramp.explain.mixed_story import acts_of
 from coramp.explain.story import quantities_in, told, tried_in
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
@@ -78,6 +79,7 @@ def page_data(run: RunRecords) -> Row:
         ],
         "events": _events(run, place_of),
         "heard": heard_data(run, place_of, end_s),
+        "acts": acts_of(run),
     }
 
 

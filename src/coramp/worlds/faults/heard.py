@@ -41,7 +41,9 @@ class HeardRecord:
         rows[:, 5] = air.age_s(now_s, number)
         rows[:, 6] = rows[:, 2] - users.station_m[own]
         for column, lost in zip((7, 8), air.lost_at(now_s), strict=True):
-            rows[:, column] = np.isin(number, lost)
+            among = np.zeros(len(air.reporting), np.bool_)
+            among[lost] = True
+            rows[:, column] = among[number]
         rows[:, 9] = air.falls_back(number)
         exact = known & (rows[:, 5] <= OLD_S) & (np.abs(rows[:, 6]) <= WRONG_M)
         kept = ~exact | (rows[:, 7:] > 0.5).any(axis=1)

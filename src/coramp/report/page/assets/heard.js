@@ -61,6 +61,10 @@ coramp.lapseText = (run, { bit, from, to }) => {
     : `is not known to the coordinator ${lasts}: no report of it, or none newer than ${run.heard.stale_s} s`;
 };
 
+// What a vehicle does at a time and why, where that was kept.
+coramp.actAt = (run, i, time) => (run.acts?.[run.ids[i]] ?? [])
+  .filter(([from, to]) => from <= time && time < to).map(([, , text]) => text);
+
 // When the vehicle that broke down drives on, in s; other events have no end.
 coramp.eventEnd = (run, { what, time, vehicle }) => {
   if (what !== coramp.BREAKS_DOWN) return time;
@@ -102,8 +106,8 @@ coramp.knownTold = (run, lanes, time) => {
 // What is known of one vehicle, in words; nothing where all is known.
 coramp.knownOf = (run, i, time) => {
   const known = coramp.known(run, i, time);
-  if (known === null) return [];
-  const told = [];
+  const told = coramp.actAt(run, i, time);
+  if (known === null) return told;
   if (known.unknown) told.push('not known to the coordinator');
   else if (coramp.isOff(known)) {
     const side = known.error > 0 ? 'ahead of' : 'behind';
@@ -177,7 +181,7 @@ coramp.drawSigns = (ctx, road, row, vehicle, onMainline, known, broken) => {
       if (kind === 'broken') { ctx.moveTo(x, y - 7); ctx.lineTo(x + 7, y + 5); ctx.lineTo(x - 7, y + 5); ctx.closePath(); }
       else ctx.roundRect(x - 5, y - 5, 10, 10, 3);
       ctx.fill();
-      ctx.fillStyle = '#ffffff';
+      ctx.fillStyle = coramp.colour('page');
     } else ctx.font = '800 12px system-ui, sans-serif';
     ctx.fillText(text, x, y + 0.5);
     ctx.font = '700 9px system-ui, sans-serif';

@@ -244,7 +244,8 @@ coramp.Road = class {
     ctx.fillStyle = known?.unknown ? coramp.colour('page') : coramp.speedColour(speed / this.run.road.v0_mps);
     ctx.fill();
     if (known?.unknown) ctx.setLineDash([3, 2]);
-    ctx.strokeStyle = coramp.colour(known?.fallback ? 'fallback' : 'outline');
+    const edge = known?.unknown ? 'ghost' : 'outline';
+    ctx.strokeStyle = coramp.colour(known?.fallback ? 'fallback' : edge);
     ctx.lineWidth = known?.fallback ? 3.5 : (i === selected ? 2.5 : 0.8);
     ctx.stroke();
     ctx.setLineDash([]);

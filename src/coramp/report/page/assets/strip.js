@@ -14,7 +14,7 @@ coramp.Strip = class {
     this.names = element('div', { class: 'strip-names', 'aria-hidden': 'true' },
       ...this.lines.map(({ name, colour }) => {
         const own = element('span', {}, name);
-        own.style.color = coramp.colour(colour);
+        own.style.color = `var(--${colour})`;
         return own;
       }));
     new ResizeObserver(() => this.draw()).observe(this.canvas);
