@@ -19,7 +19,6 @@ from coramp.runs.beforehand import (
     seeds_without_effect,
     without_effect_on_drivers,
 )
-from coramp.runs.mixed import check_messages_kept
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
 from coramp.scenarios.loading import load_scenario
@@ -81,8 +80,8 @@ def run(
 
     ``overrides`` are dotted keys of the scenario. ``drivers`` is the population of an uncontrolled
     run (default: fair). ``keep_messages`` keeps what the coordinator was told and commanded, for
-    ``coramp audit``. ``notice`` is told beforehand where demand is above the lane's limit, and
-    afterwards who is unserved.
+    ``coramp audit``; among drivers it keeps what vehicles did, for ``coramp explain``. ``notice``
+    is told beforehand where demand is above the lane's limit, and afterwards who is unserved.
     Raises CorampError for what cannot be run and for a run that fails.
 
     Examples:
@@ -104,8 +103,6 @@ def run(
         raise CorampError(f"{option}: the {engine} engine runs without SUMO; use --engine sumo")
     if out is None and keep_sumo:
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
-    if keep_messages:
-        check_messages_kept(spec.is_mixed)
     if notice is not None and (line := demand_above_limit(spec)) is not None:
         notice(line)
     if notice is not None and (line := without_effect_on_drivers([spec])) is not None:

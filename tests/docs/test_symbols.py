@@ -50,6 +50,8 @@ FILES = {
     "speeds.parquet": schemas.SPEEDS,
     "runs.parquet": schemas.RUNS,
     "safety_events.parquet": schemas.SAFETY_EVENTS,
+    "heard.parquet": schemas.HEARD,
+    "on_board.parquet": schemas.ON_BOARD,
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
 }

@@ -101,18 +101,6 @@ def test_ballistic_drivers_alone_are_no_mixed_traffic():
     assert not spec.is_mixed
 
 
-def test_messages_of_mixed_traffic_are_not_kept_and_nothing_is_written(tmp_path):
-    refused = told_of(*HALF, "--keep-messages", "--out", tmp_path / "run")
-    assert_refused(refused)
-    assert refused.errors == [
-        (
-            "Error: --keep-messages: automated vehicles among drivers keep no messages yet; leave "
-            "it out, or choose automated shares of 1"
-        )
-    ]
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mixed") / "run"
@@ -123,15 +111,19 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_there_is_no_plan_to_explain(folder):
-    line = (
-        "vehicles among drivers drive without plans, so that there is none to {}; {} a run of "
-        "automated vehicles alone"
-    )
+def test_what_was_not_kept_is_not_explained(folder):
     for vehicle in ("r00001", "m00001"):
         refused = invoke("explain", folder, vehicle)
         assert_refused(refused)
-        assert refused.errors == [f"Error: {folder}: {line.format('explain', 'explain')}"]
+        assert refused.errors == [
+            (
+                f"Error: {folder}: vehicles among drivers drive without plans, and what they did "
+                "on board was not kept; run again with --keep-messages"
+            )
+        ]
+    refused = invoke("explain", folder, "r00001", "--plot", folder / "p.png")
+    assert_refused(refused)
+    assert "so that there is none to explain" in refused.errors[0]
     with pytest.raises(CorampError, match="so that there is none to plot"):
         coramp.load(folder).plot_decision("r00001")
 
@@ -141,8 +133,9 @@ def test_there_is_nothing_to_audit(folder):
     assert_refused(refused)
     assert refused.errors == [
         (
-            f"Error: {folder}: automated vehicles drove among drivers here, and no messages were "
-            "kept; audit a run of automated vehicles alone, or of drivers alone"
+            f"Error: {folder}: automated vehicles drove among drivers here, and such runs keep no "
+            "log that an audit could repeat; audit a run of automated vehicles alone, or of "
+            "drivers alone"
         )
     ]
 

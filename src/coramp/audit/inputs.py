@@ -59,8 +59,9 @@ def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     path = folder / f"{MESSAGES}.parquet"
     if run.safety_events is not None and not path.exists():
         raise CorampError(
-            f"{folder}: automated vehicles drove among drivers here, and no messages were kept; "
-            "audit a run of automated vehicles alone, or of drivers alone"
+            f"{folder}: automated vehicles drove among drivers here, and such runs keep no log "
+            "that an audit could repeat; audit a run of automated vehicles alone, or of drivers "
+            "alone"
         )
     log = read_log(path, scenario.control.step_s, known, put_in_order)
     askers = _askers(log, scenario)

@@ -99,7 +99,9 @@ def print_run(
         print(f"The world: {told_of}.")
     if out is not None:
         told = f"coramp explain {out} VEHICLE explains one vehicle's plan"
-        if result.decisions is None:
+        if result.on_board is not None:
+            told = f"coramp explain {out} VEHICLE tells what one vehicle did, and why"
+        elif result.decisions is None:
             told = f"coramp report {out} shows them"
         print(f"Records are in {out}; {told}.")
 

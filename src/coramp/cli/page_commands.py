@@ -23,10 +23,19 @@ def explain(
 ) -> None:
     """Explain one vehicle's plan, with the numbers behind it."""
     from coramp.cli.console import print_json, print_story, story_json
+    from coramp.cli.mixed_console import mixed_story_json, print_mixed_story
+    from coramp.explain.mixed_story import is_told_apart, mixed_story_in
     from coramp.explain.story import story_in
     from coramp.records.run_folder import read_run
 
     run = read_run(folder)
+    if is_told_apart(run) and plot is None:
+        mixed = mixed_story_in(run, vehicle, folder)
+        if json:
+            print_json(mixed_story_json(mixed))
+        else:
+            print_mixed_story(mixed)
+        return
     story = story_in(run, vehicle, folder)
     if plot is not None:
         from coramp.report.story_figure import save_story_figure

@@ -64,7 +64,10 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Folder for the records.")] = None,
     keep_sumo: Annotated[bool, typer.Option(help="Keep SUMO's own files in OUT/sumo.")] = False,
     keep_messages: Annotated[
-        bool, typer.Option(help="Keep all messages and commands, for coramp audit.")
+        bool,
+        typer.Option(
+            help="Keep messages and commands, for coramp audit; among drivers for explain."
+        ),
     ] = False,
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
     json: Json = False,

@@ -16,6 +16,7 @@ from coramp.metrics.fitting import fitted_pieces
 from coramp.metrics.frames import decisions_table, frame_of, trajectories_table
 from coramp.metrics.lane_figures import bound_figures, braking_figures
 from coramp.metrics.mixed_figures import mixed_figures, safety_events
+from coramp.metrics.mixed_tables import heard_table, on_board_table
 from coramp.metrics.motion import (
     BIN_S,
     binned_motion,
@@ -73,6 +74,8 @@ class RunTables:
             "attempts": self.attempts,
             "messages": self.messages,
             "safety_events": self.safety_events,
+            "heard": heard_table(self.outcome),
+            "on_board": on_board_table(self.outcome),
         }
         return {name: frame for name, frame in every.items() if frame is not None}
 

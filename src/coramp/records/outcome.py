@@ -68,7 +68,9 @@ class Outcome:
     where they were to be kept. ``drivers`` names their population; ``collided`` are those whom the
     simulator saw collide: time (s), places of rear and front vehicle. ``messages_of_air``
     counts messages and fallbacks; ``world_events`` are what happened by itself: time (s), what, and
-    the vehicle's place. All four are for mixed traffic.
+    the vehicle's place. ``heard`` and ``on_board`` are columns by name, None where they were not to
+    be kept: what the coordinator knew, and what vehicles did and why. All six are for mixed
+    traffic.
     """
 
     cooperative: bool
@@ -88,6 +90,8 @@ class Outcome:
     collided: tuple[tuple[float, int, int], ...] = ()
     messages_of_air: Mapping[str, int] = field(default_factory=dict)
     world_events: tuple[tuple[float, str, int], ...] = ()
+    heard: Mapping[str, FloatArray] | None = None
+    on_board: Mapping[str, FloatArray] | None = None
 
     @property
     def until_s(self) -> FloatArray:

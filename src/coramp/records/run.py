@@ -19,6 +19,8 @@ TABLES = (
     "types",
     "attempts",
     "safety_events",
+    "heard",
+    "on_board",
 )
 """Names of the tables of a run; a table that there is lies in NAME.parquet."""
 MESSAGES = "messages"
@@ -33,7 +35,8 @@ class RunRecords:
     trajectories and decisions only of cooperative runs, and positions of the others. Violations,
     positions, attempts and figures by type (of runs with several types) are None where a coramp
     that kept none wrote the run, messages where they were not to be kept, and in a run that was
-    read. There are safety events of mixed traffic alone.
+    read. There are safety events of mixed traffic alone, what was heard where the world fails, and
+    what was done on board where messages were kept.
     """
 
     content: Row
@@ -48,6 +51,8 @@ class RunRecords:
     types: pl.DataFrame | None = None
     attempts: pl.DataFrame | None = None
     safety_events: pl.DataFrame | None = None
+    heard: pl.DataFrame | None = None
+    on_board: pl.DataFrame | None = None
 
     @property
     def frames(self) -> dict[str, pl.DataFrame]:

@@ -127,6 +127,46 @@ SAFETY_EVENTS: Schema = {
     "front_vehicle_id": pl.String,
 }
 
+HEARD: Schema = {
+    "time_s": pl.Float64,
+    "vehicle_id": pl.String,
+    "lane": pl.String,
+    "station_m": pl.Float64,
+    "speed_mps": pl.Float64,
+    "age_s": pl.Float64,
+    "error_m": pl.Float64,
+    "report_lost": pl.Boolean,
+    "command_lost": pl.Boolean,
+    "fallback": pl.Boolean,
+}
+
+ON_BOARD: Schema = {
+    "time_s": pl.Float64,
+    "vehicle_id": pl.String,
+    "lane": pl.String,
+    "station_m": pl.Float64,
+    "speed_mps": pl.Float64,
+    "law": pl.String,
+    "accel_mps2": pl.Float64,
+    "told_mps2": pl.Float64,
+    "given_s": pl.Float64,
+    "fallback": pl.Boolean,
+    "place": pl.Int64,
+    "after_vehicle_id": pl.String,
+    "leader_vehicle_id": pl.String,
+    "leader_gap_m": pl.Float64,
+    "leader_speed_mps": pl.Float64,
+    "front_vehicle_id": pl.String,
+    "front_gap_m": pl.Float64,
+    "front_speed_mps": pl.Float64,
+    "rear_vehicle_id": pl.String,
+    "rear_gap_m": pl.Float64,
+    "rear_speed_mps": pl.Float64,
+    "changes_lane": pl.Boolean,
+    "ahead_m": pl.Float64,
+    "ahead_mps": pl.Float64,
+}
+
 SPEEDS: Schema = {
     "stream": pl.String,
     "time_s": pl.Float64,

@@ -12,6 +12,8 @@ from coramp.errors import CorampError
 from coramp.records.schemas import (
     ATTEMPTS,
     DECISIONS,
+    HEARD,
+    ON_BOARD,
     RESULT_VERSION,
     RUN_KEYS,
     RUNS,
@@ -37,6 +39,8 @@ SCHEMAS: dict[str, Schema] = {
     "types": TYPES,
     "attempts": ATTEMPTS,
     "safety_events": SAFETY_EVENTS,
+    "heard": HEARD,
+    "on_board": ON_BOARD,
 }
 """The columns of a run's tables."""
 _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {

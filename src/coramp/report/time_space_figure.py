@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
+from coramp.report.lapse_marks import mark_lapses
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
 from coramp.report.style import GREY, YELLOW, grid, legend_below, new_figure
@@ -25,7 +26,8 @@ def run_time_space_figure(
     """Returns station (m) over time (s) of all vehicles of a run, a line each.
 
     From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges, those of
-    drivers where they were seen on the mainline first; the gid of a line is its vehicle's id.
+    drivers where they were seen on the mainline first; the gid of a line is its vehicle's id. Where
+    the world fails, fallbacks, gaps in what was known and breakdowns are marked on the lines.
     Raises CorampError for an empty window.
     """
     from_s = 0.0 if from_s is None else from_s
@@ -39,11 +41,13 @@ def run_time_space_figure(
     axes = figure.subplots()
     lane_m = run.scenario.ramp.acceleration_lane_m
     axes.axhspan(0.0, lane_m, color=YELLOW, alpha=0.25, label="acceleration lane")
-    for name, driven in driven_of(run.motion, run.vehicles).items():
-        times_s, stations_m = driven.line(from_s, until_s, STEP_S)
+    driven = driven_of(run.motion, run.vehicles)
+    for name, way in driven.items():
+        times_s, stations_m = way.line(from_s, until_s, STEP_S)
         if len(times_s):
-            colour, label, width_pt = _look(driven, name in moved, automated.get(name))
+            colour, label, width_pt = _look(way, name in moved, automated.get(name))
             axes.plot(times_s, stations_m, color=colour, linewidth=width_pt, label=label, gid=name)
+    mark_lapses(axes, run, driven, from_s, until_s)
     merges = _merges(run)
     within = merges.filter(merges["merge_time_s"].is_between(from_s, until_s))
     if not within.is_empty():

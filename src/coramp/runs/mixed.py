@@ -60,15 +60,6 @@ def _lag_problem(scenario: Scenario) -> str:
     )
 
 
-def check_messages_kept(is_mixed: bool) -> None:
-    """Raises CorampError where messages are to be kept of a run that has none."""
-    if is_mixed:
-        raise CorampError(
-            "--keep-messages: automated vehicles among drivers keep no messages yet; "
-            "leave it out, or choose automated shares of 1"
-        )
-
-
 def _asked_for(scenario: Scenario) -> tuple[str, str]:
     """What is asked of a run that not all can do, and what to ask for instead."""
     if scenario.is_mixed:

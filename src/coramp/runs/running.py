@@ -5,7 +5,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
@@ -268,7 +268,7 @@ def recorded(
         warning = slow_merge_warning(spec.scenario)
         if warning is not None:
             notice(warning)
-    tables, row = execute(spec, options)
+    tables, row = execute(spec, replace(options or SumoOptions(), keep_heard=True))
     if (line := unserved_line(tables.outcome)) is not None:
         notice(line)
     if (line := unheeded_line(tables.outcome)) is not None:

@@ -21,6 +21,8 @@ SCRIPTS = (
     "diagram.js",
     "delay.js",
     "looks.js",
+    "heard.js",
+    "strip.js",
     "road.js",
     "replay.js",
     "page.js",

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from coramp.explain.mixed_story import acts_of
 from coramp.explain.story import quantities_in, told, tried_in
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.records.world_told import HAPPENED
+from coramp.report.page.heard_shown import heard_data
 from coramp.report.style import look_of
 from coramp.runs.running import UNCONTROLLED
 from coramp.scenarios.model import Scenario
@@ -49,12 +51,13 @@ def page_data(run: RunRecords) -> Row:
     last_s = max([exit_s for exit_s in exits_s if exit_s is not None], default=0.0)
     simulation = run.scenario.simulation
     capped = any(exit_s is None for exit_s in exits_s)
+    end_s = simulation.horizon_s + simulation.drain_s if capped else last_s
     return {
         "title": title_of(run),
         "strategy": run.summary["strategy"],
         "drivers": run.summary["drivers"],
         "seed": run.summary["seed"],
-        "end_s": simulation.horizon_s + simulation.drain_s if capped else last_s,
+        "end_s": end_s,
         "road": road_data(run.scenario),
         "safety": run.scenario.safety.model_dump(mode="json"),
         "ids": ids,
@@ -83,6 +86,8 @@ def page_data(run: RunRecords) -> Row:
             for row in _rows(run.violations)
         ],
         "events": _events(run, place_of),
+        "heard": heard_data(run, place_of, end_s),
+        "acts": acts_of(run),
     }
 
 

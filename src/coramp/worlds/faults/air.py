@@ -184,6 +184,34 @@ class Air:
         self.fallbacks += int((overdue & ~self._overdue[users.number]).sum())
         self._overdue[users.number] = overdue
 
+    def age_s(self, now_s: float, number: IntArray) -> FloatArray:
+        """Returns how old by its stamp (s) the last report of each vehicle is, nan without one."""
+        return np.asarray(np.maximum(now_s - self._known[number, STAMP], 0.0))
+
+    def given_s(self, number: IntArray) -> FloatArray:
+        """Returns when the last command that each vehicle has was given, nan without one."""
+        return np.asarray(self._command[number, GIVEN])
+
+    def falls_back(self, number: IntArray) -> BoolArray:
+        """Returns whose last command has expired."""
+        return np.asarray(self._overdue[number])
+
+    def lost_at(self, now_s: float) -> tuple[IntArray, IntArray]:
+        """Returns whose reports, and to whom commands, of this time are lost."""
+        return self._reports.lost_at(now_s), self._commands.lost_at(now_s)
+
+    def faults(self, entry_s: FloatArray, until_s: FloatArray) -> list[tuple[float, str, int]]:
+        """Returns which vehicles failed while they were on the road: time (s), what, number."""
+        silent_s = np.maximum(self._silent_from_s, entry_s)
+        found = [(now_s, "positioning fails", n) for now_s, n in self._positions.outages]
+        for what, from_s, chosen in (
+            ("vehicle falls silent", silent_s, silent_s < until_s),
+            ("vehicle disobeys", entry_s, self._disobeys & ~np.isnan(entry_s)),
+            ("vehicle lies", entry_s, (self._lie_m != 0.0) & ~np.isnan(entry_s)),
+        ):
+            found += [(float(from_s[n]), what, n) for n in np.flatnonzero(chosen).tolist()]
+        return found
+
     @property
     def counts(self) -> dict[str, int]:
         """How many messages there were, how many were lost, how often vehicles went alone."""

@@ -25,6 +25,7 @@ class LossyLink:
     random_of: Callable[[str], np.random.Generator]
     sent: int = 0
     lost: int = 0
+    _lost_last: tuple[float, IntArray] = (np.nan, np.empty(0, np.int64))
     _due_s: FloatArray = field(default_factory=lambda: np.empty(0))
     _rows: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     _bad: BoolArray = field(init=False)
@@ -47,6 +48,7 @@ class LossyLink:
         arrives = ~self._lost(now_s, number)
         self.sent += len(rows)
         self.lost += int((~arrives).sum())
+        self._lost_last = now_s, number[~arrives]
         due_s = [now_s + self._latency_s(self._delay, number)[arrives]]
         kept = [rows[arrives]]
         if self.section.duplicates > 0.0:
@@ -57,6 +59,11 @@ class LossyLink:
         waiting = self._rows.reshape(-1, rows.shape[1])
         self._due_s = np.concatenate([self._due_s, *due_s])
         self._rows = np.concatenate([waiting, *kept])
+
+    def lost_at(self, now_s: float) -> IntArray:
+        """Returns whose messages of this time are lost."""
+        sent_s, number = self._lost_last
+        return number if sent_s == now_s else number[:0]
 
     def received(self, now_s: float) -> FloatArray:
         """Returns the rows that have arrived since this was last asked, in order of arrival."""

@@ -17,6 +17,7 @@ class WrongPositions:
     """The error of each vehicle's position: bias, Gauss-Markov noise, drift in an outage.
 
     e(t + d) = e(t) exp(-d / T) + sigma sqrt(1 - exp(-2 d / T)) n, n standard normal.
+    ``outages`` are those that have begun: when (s), and which vehicle's.
     ``random_of`` returns random numbers by a fault's name. Each time is drawn for all vehicles, so
     that neither another fault nor who is on the road changes a vehicle's draws.
     """
@@ -24,6 +25,7 @@ class WrongPositions:
     section: Positioning
     vehicles: int
     random_of: Callable[[str], np.random.Generator]
+    outages: list[tuple[float, int]] = field(default_factory=list)
     _noise: np.random.Generator = field(init=False)
     _speed_noise: np.random.Generator = field(init=False)
     _outages: np.random.Generator = field(init=False)
@@ -64,6 +66,7 @@ class WrongPositions:
         begins = self._outages.random(self.vehicles)[number] < chance
         lasts_s = self._outages.exponential(self.section.outage_s, self.vehicles)[number]
         begins &= self._out_until_s[number] <= now_s  # one that is out does not go out again
+        self.outages += [(now_s, n) for n in number[begins].tolist()]
         until_s = np.where(begins, now_s + lasts_s, self._out_until_s[number])
         out: BoolArray = until_s > now_s
         drift_m = self._drift_m[number] + self.section.outage_drift_mps * since_s

@@ -43,12 +43,14 @@ class SumoOptions:
     """How a run is watched: files kept in a folder, a window, messages kept in the outcome.
 
     ``tell`` is told, while SUMO runs, the time (s) that is simulated, and infinity at its end.
+    ``keep_heard`` keeps what the coordinator of mixed traffic knew in a world that fails.
     """
 
     keep_in: Path | None = None
     gui: bool = False
     keep_messages: bool = False
     tell: Callable[[float], None] | None = None
+    keep_heard: bool = False
 
 
 class RunFiles:

@@ -21,6 +21,7 @@ from coramp.worlds.sumo.as_driven import outcome_as_driven
 from coramp.worlds.sumo.careless import Careless
 from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
+from coramp.worlds.sumo.mixed_notes import Notes, notes_of
 from coramp.worlds.sumo.mixed_plant import MixedPlant
 from coramp.worlds.sumo.mixed_setup import (
     Able,
@@ -65,30 +66,38 @@ def run_mixed(
             )
             heard = automated | connected_of(scenario, arrivals, seed)
             laws = laws_of(scenario, drivers, plant.period_s)
-            control = Control(strategy, laws, Air(scenario, heard, automated, seed))
+            air = Air(scenario, heard, automated, seed)
+            control = Control(strategy, laws, air, notes=notes_of(options, air))
             careless = Careless(scenario, session, seed)
             control.drive(plant, careless, cap_step_of(scenario))
         files.keep()
         samples = files.samples(arrivals)
         outcome = outcome_as_driven(scenario, arrivals, samples, files)
     passages = replace(outcome.passages, plan_error_m=plant.largest_error_m, automated=automated)
+    notes = control.notes or Notes(None, None)
     return replace(
         outcome,
         passages=passages,
         drivers=population,
         messages_of_air=control.air.counts,
-        world_events=tuple(careless.events),
+        world_events=(*careless.events, *air.faults(passages.entry_s, outcome.until_s)),
+        heard=None if notes.heard is None else notes.heard.columns(),
+        on_board=None if notes.on_board is None else notes.on_board.columns(),
     )
 
 
 @dataclass
 class Control:
-    """The strategy for all, what reaches it and whom, and what each vehicle does on board."""
+    """The strategy for all, what reaches it and whom, and what each vehicle does on board.
+
+    ``notes`` is where that is noted, if anywhere.
+    """
 
     strategy: MixedStrategy
     laws: OnBoardLaws
     air: Air
     places: Places = field(default=())
+    notes: Notes | None = None
 
     def drive(self, plant: MixedPlant, careless: Careless, cap_step: int) -> None:
         """Lets SUMO run until it is empty, commanding once a period."""
@@ -103,6 +112,10 @@ class Control:
                 able = on_lane & ~careless.broken_down(now_s, users.number)
                 accel_mps2, changes = self.commands(now_s, plant, able, users)
                 accel_mps2 = careless.with_breakdown(now_s, users, accel_mps2)
+                if self.notes is not None:
+                    known = self.air, self.places, self.laws
+                    driven = accel_mps2, changes
+                    self.notes.driven(now_s, users, plant.ahead(users), driven, known)
                 plant.command(names, users, accel_mps2, changes)
 
     def commands(
@@ -137,4 +150,7 @@ class Control:
             )
             self.places = steering.places
             self.air.tell(now_s, seen, steering)
-        return self.air.told(now_s, users)
+        told_mps2, may_merge = self.air.told(now_s, users)
+        if self.notes is not None:
+            self.notes.told(now_s, users, seen, told_mps2, self.air)
+        return told_mps2, may_merge

@@ -9,6 +9,9 @@ coramp.story = (run, i, time) => {
     ...(run.decisionsOf.get(i) ?? []).map((d) => [d.time, d.told]),
     ...(run.movedFor.get(i) ?? []).map((d) => [d.time, `moves for ${run.ids[d.vehicle]}`]),
     ...(run.violating.get(i) ?? []).map((v) => [v.time, coramp.violationText(run, v)]),
+    ...coramp.lapses(run).filter((lapse) => lapse.vehicle === i && !(run.acts && lapse.bit === coramp.FALLBACK)).map((lapse) => [lapse.from, coramp.lapseText(run, lapse)]),
+    ...(run.events ?? []).filter((e) => e.vehicle === i).map((e) => [e.time, e.what]),
+    ...(run.acts?.[run.ids[i]] ?? []).map(([from, , text]) => [from, text]),
   ];
   if (run.first[i + 1] > run.first[i]) {
     events.push([coramp.entry(run, i), 'enters']);

@@ -254,12 +254,16 @@ coramp.Diagram = class {
       (i) => coramp.entry(this.run, i) <= max && coramp.exit(this.run, i) >= min);
     this.clipped(u, (ctx) => {
       ctx.lineJoin = 'round';
+      this.lapses(u, new Set(seen), coramp.FALLBACK, 'fallback', 6, []);
       for (const role of ['driver', 'automated', 'mainline', 'moved', 'ramp']) {
         for (const byRamp of [0, 1]) {
           const own = (i) => coramp.role(this.run, i) === role && this.run.on_ramp[i] === byRamp;
           this.stroke(u, seen.filter(own), role, byRamp ? 1.6 : 1);
         }
       }
+      this.lapses(u, new Set(seen), coramp.UNKNOWN, 'page', 3, [2, 3]);
+      (this.run.events ?? []).filter((e) => e.what === coramp.BREAKS_DOWN)
+        .forEach((e) => this.part(u, e.vehicle, e.time, e.end ??= coramp.eventEnd(this.run, e), 'broken', 5, []));
       const marked = [...new Set([this.selected, this.hovered])].filter((i) => i !== null);
       marked.forEach((i) => this.stroke(u, [i], coramp.role(this.run, i), 4));
       this.marks(u, seen);
@@ -280,6 +284,33 @@ coramp.Diagram = class {
       });
     }
     ctx.stroke();
+  }
+
+  // Parts of lines in which vehicles fell back, or were not known.
+  lapses(u, seen, bit, colour, width, dash) {
+    const { min, max } = u.scales.x;
+    coramp.lapses(this.run)
+      .filter((lapse) => lapse.bit === bit && seen.has(lapse.vehicle) && lapse.from <= max && lapse.to >= min)
+      .forEach(({ vehicle, from, to }) => this.part(u, vehicle, from, to, colour, width, dash));
+  }
+
+  part(u, i, from, to, colour, width, dash) {
+    const { ctx } = u;
+    const until = Math.min(to, coramp.exit(this.run, i));
+    const steps = Math.max(1, Math.ceil((until - from) / 0.5));
+    ctx.save();
+    ctx.globalAlpha = colour === 'fallback' ? 0.55 : 1;
+    ctx.strokeStyle = coramp.colour(colour);
+    ctx.lineWidth = width * devicePixelRatio;
+    ctx.setLineDash(dash.map((part) => part * devicePixelRatio));
+    ctx.beginPath();
+    for (let k = 0; k <= steps; k += 1) {
+      const time = from + ((until - from) * k) / steps;
+      const [x, y] = [u.valToPos(time, 'x', true), u.valToPos(coramp.state(this.run, i, time).station, 'y', true)];
+      if (k === 0) ctx.moveTo(x, y); else ctx.lineTo(x, y);
+    }
+    ctx.stroke();
+    ctx.restore();
   }
 
   // Merges as dots; violations as rings around the rear vehicle.

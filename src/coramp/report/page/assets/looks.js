@@ -56,7 +56,7 @@ coramp.windscreen = (ctx, run, i, m, high) => {
 };
 
 // The legend of the replay; ``run`` says how fast one drives there.
-coramp.replayLegend = (run, cooperative, mixed) => {
+coramp.replayLegend = (run, cooperative, mixed, runs = [run]) => {
   const { element } = coramp;
   const v0 = run.road.v0_mps;
   const ramp = coramp.SPEED_COLOURS.map(([place]) => `${coramp.speedColour(place)} ${100 * place}%`);
@@ -72,6 +72,23 @@ coramp.replayLegend = (run, cooperative, mixed) => {
     mixed ? item('automated', 'violet stripe: automated; the others have drivers') : null,
     item('slow', `red road: slow traffic (mainline below ${coramp.kmh(slow)})`),
     item('stopped', 'ring: stands'),
+    ...coramp.knownLegend(runs, item),
     cooperative ? item('place', 'dashed: the place on the mainline that a ramp vehicle will take, and keep free') : null,
     item('safe', 'green ahead of a vehicle: its safe distance, red where it is nearer'));
+};
+
+// What of the legend is about a world that fails, where there is such a thing to see.
+coramp.knownLegend = (runs, item) => {
+  const heard = runs.find((run) => run.heard)?.heard;
+  const broken = runs.some((run) => (run.events ?? []).some((e) => e.what === coramp.BREAKS_DOWN));
+  const { element } = coramp;
+  const crosses = () => element('li', {}, element('span', { class: 'mark lost lost-report', 'aria-hidden': 'true' }, '×'),
+    element('span', { class: 'mark lost lost-command', 'aria-hidden': 'true' }, '×'), 'its report, its command is lost');
+  return [
+    broken ? item('broken', 'triangle: broken down') : null,
+    heard ? item('known', 'dashed, with a bar: where the coordinator takes it to be, and where it may be by then') : null,
+    heard ? item('unknown', `hollow, ?: not known to the coordinator (no report for ${heard.stale_s} s)`) : null,
+    heard ? item('fallback', `thick outline, F: fallback, its last command is older than ${heard.valid_s} s`) : null,
+    heard ? crosses() : null,
+  ];
 };

@@ -58,6 +58,8 @@ coramp.legend = (runs) => {
     ramp: `${runs.every((run) => run.automated) ? 'dot' : 'ramp vehicle, dot'}: merge of a ramp vehicle` };
   const roles = { ramp: 'ramp vehicle, dot: its merge', moved: 'moves for another', mainline: 'mainline vehicle' };
   const entries = { ...(runs.every((run) => run.automated) ? {} : roles), ...(runs.some((run) => run.automated) ? kinds : {}),
+    ...(runs.some((run) => run.heard) ? { fallback: 'in fallback', unknown: 'gaps in a line: not known to the coordinator' } : {}),
+    ...(runs.some((run) => run.events?.some((e) => e.what === coramp.BREAKS_DOWN)) ? { broken: 'broken down' } : {}),
     lane: 'stations of the acceleration lane', bad: 'nearer than the safe distance', upright: 'time of the replay' };
   return element('ul', { class: 'legend' }, ...Object.entries(entries).map(([key, text]) =>
     element('li', {}, element('span', { class: `swatch ${key}`, 'aria-hidden': 'true' }), text)));

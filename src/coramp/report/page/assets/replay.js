@@ -55,13 +55,15 @@ coramp.Replay = class {
       element('p', {}, `Latest decisions, ${run.title}`), log)));
     const cooperative = deciding.length > 0;
     this.legend = coramp.replayLegend(this.runs[0], cooperative,
-      this.runs.some((run) => run.automated));
+      this.runs.some((run) => run.automated), this.runs);
     this.box.append(this.place, this.legend,
       element('p', { class: 'hint' }, 'Lengths are to scale. Everyone drives to the right; the road goes on in the '
         + `row below. ${coramp.Replay.KEYS}`),
       element('div', { class: 'tools' },
         element('label', {}, 'view ', this.views), element('label', {}, 'enlarged ', this.zooms),
-        element('label', {}, this.distances, ' safe distances')));
+        element('label', {}, this.distances, ' safe distances'),
+        this.runs.some((run) => coramp.lapses(run).length) ? element('button', { type: 'button',
+          onclick: () => this.nextLapse() }, 'next fallback or lost sight') : null));
     new ResizeObserver(() => this.draw()).observe(this.place);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
     const listener = (event) => {
@@ -89,7 +91,16 @@ coramp.Replay = class {
       onclick: () => this.seek(this.time + by) }, text);
     this.bar = element('div', { class: 'bar', role: 'group', 'aria-label': 'play' },
       element('div', { class: 'buttons' }, this.playButton, step(-1, 'one second back', '−1 s'),
-        step(1, 'one second on', '+1 s'), this.speeds, this.clock), this.slider, ...this.happened());
+        step(1, 'one second on', '+1 s'), this.speeds, this.clock), this.timeAxis(), ...this.happened());
+  }
+
+  // The slider, and below it what failed when.
+  timeAxis() {
+    this.strips = this.runs.map((run) => new coramp.Strip(run, this.end, (time) => { this.pause(); this.seek(time); }))
+      .filter((strip) => !strip.isEmpty);
+    if (!this.strips.length) return this.slider;
+    return coramp.element('div', { class: 'axis' }, this.slider,
+      ...this.strips.flatMap((strip) => [strip.names, strip.canvas]));
   }
 
   // What happened by itself: ticks on the time axis, and buttons that go there.
@@ -167,6 +178,22 @@ coramp.Replay = class {
     this.choose(run, there[place]);
   }
 
+  // Goes to the next time at which a vehicle near the merge fell back or was not known.
+  nextLapse() {
+    const [from, to] = [-200, this.runs[0].road.lane_m];
+    const near = (run, { vehicle, from: time }) => {
+      const { station } = coramp.state(run, vehicle, time);
+      return station > from && station < to;
+    };
+    const found = this.runs.flatMap((run) => coramp.lapses(run).filter((lapse) => near(run, lapse))
+      .map((lapse) => ({ run, ...lapse })));
+    const next = found.find((lapse) => lapse.from > this.time + 0.05) ?? found[0];
+    if (!next) return;
+    this.pause();
+    this.seek(next.from + 0.2);
+    this.choose(next.run, next.vehicle);
+  }
+
   look() {
     this.panels.forEach(({ road }) => Object.assign(road, { view: this.views.value, zoom: Number(this.zooms.value) }));
     this.draw();
@@ -234,7 +261,7 @@ coramp.Replay = class {
     return [`${lanes.mainline.length} on the mainline`, `${lanes.ramp.length} on ramp and acceleration lane`,
       ...few(slow(lanes.mainline, true) + slow(lanes.ramp, false), 'slow'),
       ...few(everyone.filter((v) => v.speed < coramp.STOPPED_MPS).length, 'standing'),
-      ...few(coramp.waiting(run, this.time), 'waiting to enter')];
+      ...few(coramp.waiting(run, this.time), 'waiting to enter'), ...coramp.knownTold(run, lanes, this.time)];
   }
 
   smallestGap(lanes) {
@@ -251,7 +278,8 @@ coramp.Replay = class {
     const i = run.indexOf.get(this.selected);
     const found = [...lanes.mainline, ...lanes.ramp].find((v) => v.i === i);
     if (!found) return [];
-    return [`${this.selected}: ${coramp.kmh(found.speed)}, delay so far ${coramp.delayOf(run, i, this.time).toFixed(1)} s`];
+    return [`${this.selected}: ${coramp.kmh(found.speed)}, delay so far ${coramp.delayOf(run, i, this.time).toFixed(1)} s`,
+      ...coramp.knownOf(run, i, this.time)];
   }
 
   // What is drawn where, for tests and for those who build on it; pixels of the page's canvas.

@@ -86,6 +86,8 @@ coramp.Road = class {
     ctx.clearRect(0, 0, this.canvas.width, this.canvas.height);
     this.seen = [];
     const pending = this.pending(time);
+    const broken = coramp.brokenDown(this.run, time);
+    this.known = new Map([...lanes.mainline, ...lanes.ramp].map(({ i }) => [i, coramp.known(this.run, i, time)]));
     for (const row of this.rows) {
       ctx.save();
       ctx.beginPath();
@@ -97,6 +99,12 @@ coramp.Road = class {
       if (distances) this.each(row, lanes, (vehicle, main) => this.drawDistance(ctx, row, vehicle, main));
       pending.forEach((decision) => this.drawPlace(ctx, row, decision, time, [selected, hovered]));
       this.each(row, lanes, (vehicle, main) => this.drawVehicle(ctx, row, vehicle, main, selected));
+      this.each(row, lanes, (vehicle) => {
+        const known = this.known.get(vehicle.i);
+        if (coramp.isOff(known)) coramp.drawKnown(ctx, this, row, vehicle, known);
+      });
+      this.each(row, lanes, (vehicle, main) => coramp.drawSigns(
+        ctx, this, row, vehicle, main, this.known.get(vehicle.i), broken.has(vehicle.i)));
       this.each(row, lanes, (vehicle, main) => {
         if ([selected, hovered].includes(vehicle.i)) this.name(ctx, row, vehicle, main);
       });
@@ -232,11 +240,15 @@ coramp.Road = class {
     ctx.translate(x, y);
     ctx.rotate(Math.atan2(rise, this.run.length[i] * this.scale));
     coramp.bodyOf(ctx, this.run, i, this.scale, high);
-    ctx.fillStyle = coramp.speedColour(speed / this.run.road.v0_mps);
+    const known = this.known.get(i);
+    ctx.fillStyle = known?.unknown ? coramp.colour('page') : coramp.speedColour(speed / this.run.road.v0_mps);
     ctx.fill();
-    ctx.strokeStyle = coramp.colour('outline');
-    ctx.lineWidth = i === selected ? 2.5 : 0.8;
+    if (known?.unknown) ctx.setLineDash([3, 2]);
+    const edge = known?.unknown ? 'ghost' : 'outline';
+    ctx.strokeStyle = coramp.colour(known?.fallback ? 'fallback' : edge);
+    ctx.lineWidth = known?.fallback ? 3.5 : (i === selected ? 2.5 : 0.8);
     ctx.stroke();
+    ctx.setLineDash([]);
     coramp.windscreen(ctx, this.run, i, this.scale, high);
     ctx.fillStyle = 'rgb(20 26 34 / 65%)';
     ctx.fill();
