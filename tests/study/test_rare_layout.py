@@ -62,7 +62,9 @@ def test_a_rate_is_the_weighted_sum_over_the_distance_of_all_runs():
     rows = [row(seed, collisions=events.get(seed, 0)) for seed in SEEDS]
     cells = by_event(rows)["collision"]
     rate = 1e6 * (3.0 * ratio(with_one) + ratio(with_two)) / 600.0
-    assert cells["rate per million vehicle km"].startswith(f"{rate:.2g} (")
+    assert float(cells["rate per million vehicle km"].split(" ")[0]) == pytest.approx(
+        rate, rel=0.05
+    )
     assert cells["events seen"] == "4"
     assert cells["runs"] == "12"
     assert cells["vehicle km"] == "600"
@@ -76,7 +78,9 @@ def test_events_without_a_braking_do_not_count():
     cells = by_event(rows)["collision"]
     assert cells["events seen"] == "0"
     limit = -math.log(0.05) * 1e6 * max(ratio(seed) for seed in SEEDS if BRAKINGS[seed]) / 600.0
-    assert cells["rate per million vehicle km"] == f"0 (below {limit:.2g})"
+    told = cells["rate per million vehicle km"]
+    assert told.startswith("0 (below ")
+    assert float(told[len("0 (below ") : -1]) == pytest.approx(limit, rel=0.05)
 
 
 def test_events_that_a_kind_of_run_does_not_have_are_left_out():

@@ -68,6 +68,21 @@ def test_a_vehicle_breaks_down_where_and_when_it_is_said(strategy, share, place,
     assert np.isfinite(tables.outcome.passages.exit_s).all()
 
 
+def test_events_of_drivers_alone_are_recorded_too():
+    """Nobody is automated; without a fault there is nothing to tell."""
+    keys = {
+        "incidents.breakdown_s": 40.0,
+        "incidents.lasts_s": 10.0,
+        "behaviour.brakes_for_nothing_per_h": 200.0,
+    }
+    tables, row = driven(keys, "uncontrolled", share=0.0)
+    events = tables.safety_events["event"].to_list()
+    assert events.count("vehicle breaks down") == 1
+    assert events.count("driver brakes for nothing") >= 2
+    assert row["automated_vehicles"] is None
+    assert driven({}, "uncontrolled", share=0.0)[0].safety_events is None
+
+
 def test_the_next_to_reach_the_station_is_the_one_that_breaks_down():
     keys = {"incidents.breakdown_s": 40.0, "incidents.station_m": -100.0}
     tables, _ = driven(keys, share=1e-9)

@@ -48,9 +48,9 @@ def weighted_rate(
     all runs that were drawn. The interval is that of Fay and Feuer (1997, Statistics in Medicine
     16, 791-801) for weighted Poisson counts, with the run as the unit: with y = sum w x,
     v = sum (w x)^2 and m the largest weight (times the largest x), y and y + m are gamma
-    distributed with the variances v and v + m^2. For equal weights and single events it is Garwood's
-    exact one. Without an event it is 0 to the one-sided limit -m ln 0.05 / exposure, the rule of
-    three for events of the largest weight. Nan without exposure or weights.
+    distributed with the variances v and v + m^2. For equal weights and single events it is
+    Garwood's exact one. Without an event it is 0 to the one-sided limit -m ln 0.05 / exposure, the
+    rule of three for events of the largest weight. Nan without exposure or weights.
     """
     if exposure <= 0.0 or not weights:
         return WeightedRate(math.nan, math.nan, math.nan, 0.0)

@@ -4,10 +4,12 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
 import polars as pl
 
 from coramp.studies.hostile_runs import (
     BRAKES_PER_H,
+    DRIVERS_ALONE,
     HORIZON,
     PERFECT,
     is_drawn,
@@ -70,7 +72,8 @@ def rare_tables(good: pl.DataFrame) -> list[Table]:
     for run in good.iter_rows(named=True):
         if is_drawn(run):
             groups.setdefault(_names(run), []).append(run)
-    rows = [row for names, runs in groups.items() for row in _rows(names, drawn_of(runs))]
+    order = sorted(groups, key=lambda names: (names[1] == DRIVERS_ALONE, names))
+    rows = [row for names in order for row in _rows(names, drawn_of(groups[names]))]
     if not rows:
         return []
     importance = ("fault", "share", "event", *COLUMNS[9:])
@@ -108,8 +111,13 @@ def _rate(found: WeightedRate) -> str:
     if math.isnan(rate):
         return "-"
     if rate == 0.0:
-        return f"0 (below {high:.2g})"
-    return f"{rate:.2g} ({low:.2g} to {high:.2g})"
+        return f"0 (below {_rounded(high)})"
+    return f"{_rounded(rate)} ({_rounded(low)} to {_rounded(high)})"
+
+
+def _rounded(value: float) -> str:
+    """Two significant digits, without an exponent."""
+    return np.format_float_positional(value, precision=2, fractional=False, trim="-")
 
 
 def drawn_of(runs: Sequence[Run]) -> Drawn:
