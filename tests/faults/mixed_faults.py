@@ -143,7 +143,7 @@ PROTOCOL = (
         LINK,
         'order = np.argsort(self._due_s[there], kind="stable")',
         "order = np.arange(there.sum())",
-        f"{OF_LINKS}::test_messages_with_a_drawn_latency_overtake_one_another",
+        f"{OF_LINKS}::test_messages_are_handed_over_in_the_order_in_which_they_arrived",
     ),
     _fault(
         "drivers who are not connected are known",
