@@ -32,7 +32,9 @@ def chosen(tables: tuple[Table, ...], asked: str) -> str:
     if not table.rows:
         return "None."
     lines = without_same(table).to_markdown().splitlines()
-    return "\n".join(line for line in lines if line.startswith("|"))
+    rows = [line for line in lines if line.startswith("|")]
+    same = [line for line in lines if line.startswith("In all rows")]
+    return "\n".join([*rows, *(("", *same) if same else ())])
 
 
 def write_page(folder: str, page: str, figure: str, draw: Callable[[StudyResult], Figure]) -> None:

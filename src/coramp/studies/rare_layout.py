@@ -53,7 +53,7 @@ NOTE = (
 COLUMNS = (
     *("fault", "vehicles", "drivers", "setting", "flow (veh/h)", "share", "event"),
     *("runs", "with a braking", "vehicle km", "events seen", "rate per million vehicle km"),
-    *("effective sample size", "with an event"),
+    "effective sample size",
 )
 
 
@@ -101,8 +101,13 @@ def _rows(names: tuple[str, ...], drawn: Drawn) -> Iterator[tuple[str, ...]]:
         found = weighted_rate(drawn.weights, counts, drawn.vehicle_km)
         yield (
             *(*names, event, str(drawn.runs), str(len(drawn.braked)), km, str(sum(counts))),
-            *(_rate(found), number(effective_size(drawn.weights), 1), number(found.effective, 1)),
+            *(_rate(found), _sizes(effective_size(drawn.weights), found.effective)),
         )
+
+
+def _sizes(of_runs: float, with_event: float) -> str:
+    """On how many runs weights and rate rest effectively."""
+    return f"{number(of_runs, 1)}, {number(with_event, 1)} with an event"
 
 
 def _rate(found: WeightedRate) -> str:
