@@ -14,6 +14,7 @@ from PIL import Image
 import coramp
 from coramp import StudyResult
 from coramp.report.style import Figure
+from coramp.studies.hostile_runs import is_drawn
 from coramp.studies.tables import Table, without_same
 
 DOCS = Path(__file__).parents[1]
@@ -31,20 +32,25 @@ def chosen(tables: tuple[Table, ...], asked: str) -> str:
     if not table.rows:
         return "None."
     lines = without_same(table).to_markdown().splitlines()
-    return "\n".join(line for line in lines if line.startswith("|"))
+    rows = [line for line in lines if line.startswith("|")]
+    same = [line for line in lines if line.startswith("In all rows")]
+    return "\n".join([*rows, *(("", *same) if same else ())])
 
 
 def write_page(folder: str, page: str, figure: str, draw: Callable[[StudyResult], Figure]) -> None:
     """Rewrites what stands between the markers of a page of the docs, and its figure."""
     study = coramp.load(folder)
     good = study.runs.filter(status="ok")
+    drawn = [is_drawn(run) for run in good.iter_rows(named=True)]
+    rare, good = sum(drawn), good.filter([not own for own in drawn])
     seeds = good["seed"].n_unique()
 
     def written(found: re.Match[str]) -> str:
         asked = found[1]
         if asked == "runs":
             every = "one seed" if seeds == 1 else f"{seeds} seeds"
-            text = f"The tables are those of {good.height} runs of 900 s with {every}."
+            text = f"The tables are those of {good.height} runs of 900 s with {every}"
+            text += f", and of {rare} of 90 s for rare collisions." if rare else "."
         else:
             text = chosen(study.tables, asked.removeprefix("table: "))
         return f"<!-- {asked} -->\n{text}\n\n<!-- end -->"

@@ -50,6 +50,58 @@ def test_what_cannot_be_in_a_table_is_told_with_its_key(setting, told):
     assert f"{setting.split('=')[0]}: {told}" in line
 
 
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (
+            ("commands.delay_s=0.5", "commands.valid_s=0.4"),
+            (
+                "commands.delay_s: 0.5 is not below commands.valid_s, so that every command has "
+                "expired when it arrives; allowed is below 0.4 s"
+            ),
+        ),
+        (
+            ("reports.delay_s=3.0",),
+            (
+                "reports.delay_s: 3 is not below reports.stale_s, so that every report is stale "
+                "when it arrives; allowed is below 3 s"
+            ),
+        ),
+        (
+            ("incidents.breakdown_s=5.0", "incidents.place=ramp", "incidents.station_m=250.0"),
+            (
+                "incidents.station_m: 250 is not on the ramp and acceleration lane; allowed is "
+                "between -400 and 200 m"
+            ),
+        ),
+        (
+            ("incidents.breakdown_s=5.0", "incidents.station_m=-900.0"),
+            "incidents.station_m: -900 is not on the mainline; allowed is between -400 and 400 m",
+        ),
+    ],
+)
+def test_tables_that_contradict_themselves_are_told(settings, told):
+    refused = told_of(*settings)
+    assert_refused(refused)
+    (line,) = refused.errors
+    assert line.endswith(told), line
+
+
+def test_a_file_that_contradicts_itself_is_named(tmp_path):
+    path = tmp_path / "own.toml"
+    text = invoke("scenarios", "paper").out
+    path.write_text(f"{text}\n[commands]\ndelay_s = 2.0\n")
+    refused = invoke("run", path, "-s", "mixed-slots")
+    assert_refused(refused)
+    (line,) = refused.errors
+    assert line.startswith(f"Error: {path}: commands.delay_s: 2 is not below commands.valid_s")
+
+
+def test_latency_that_varies_may_be_long_on_average_and_an_incident_may_be_off():
+    load_scenario("paper", {"commands.delay_s": 2.0, "commands.delay_shape": 1.0})
+    load_scenario("paper", {"incidents.station_m": -900.0})
+
+
 def test_a_preset_that_is_not_there_names_those_that_are():
     (line,) = told_of("world.preset=sunny").errors
     for preset in PRESETS:
@@ -135,6 +187,15 @@ def test_a_lag_that_no_plan_can_absorb_is_refused_with_the_largest_that_can_be()
         )
     for late in ({"actuators.lag_s": 1.5}, {"actuators.dead_time_s": 0.8, "actuators.lag_s": 0.73}):
         make_spec("paper", "mixed-slots", overrides={**SHORT, **late})
+
+
+def test_who_is_commanded_rarely_can_absorb_less():
+    """Each 0.5 s on 110 m: (107 - 16^2 / 3.3) / 16 - 0.5 = 1.339 s, by hand."""
+    rarely = {**SHORT, "strategy.mixed-slots.decision_s": 0.5}
+    with pytest.raises(CorampError, match=r"lag_s of up to 1\.33 s together"):
+        make_spec("paper", "mixed-slots", overrides={**rarely, "actuators.lag_s": 1.4})
+    make_spec("paper", "mixed-slots", overrides={**rarely, "actuators.lag_s": 1.33})
+    make_spec("paper", "mixed-slots", overrides={**SHORT, "actuators.lag_s": 1.4})
 
 
 def test_on_the_papers_lane_every_lag_that_can_be_given_can_be_absorbed():

@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.faults.faults import Fault
+from tests.faults.fault import Fault
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src"
+TESTS_FAILED = 1
+"""What pytest ends with where tests fail; anything else is that they could not be run."""
 
 
 class Caught(NamedTuple):
@@ -41,6 +43,8 @@ def catch(fault: Fault, folder: Path, usual: int = 0) -> Caught:
         if (times := text.count(edit.before)) != 1:
             raise ValueError(f"{edit.path}: {edit.before!r} stands there {times} times")
         path.write_text(text.replace(edit.before, edit.after))
+    if not fault.run:
+        return _by_its_test(fault, copy, 0)
     run = folder / "run"
     driven = _coramp(copy, "run", *fault.run, "--out", str(run), "--keep-messages")
     if driven.returncode:
@@ -58,9 +62,11 @@ def catch(fault: Fault, folder: Path, usual: int = 0) -> Caught:
 def _by_its_test(fault: Fault, copy: Path, refused: int) -> Caught:
     if not fault.test:
         return Caught("", "confirmed", refused)
-    tested = _python(copy, "pytest", "-q", "-p", "no:cacheprovider", fault.test)
+    tested = _python(copy, "pytest", "-q", "-x", "-p", "no:cacheprovider", fault.test)
     if tested.returncode == 0:
         return Caught("", "confirmed, and its test passes", refused)
+    if tested.returncode != TESTS_FAILED:
+        raise ValueError(f"{fault.name}: {fault.test} does not run: {tested.stdout[-500:]}")
     return Caught("a test", fault.test.split("::")[1], refused)
 
 

@@ -1,27 +1,7 @@
 """The faults: what is changed where, and the run that is driven with each."""
 
-from typing import NamedTuple
-
-
-class Edit(NamedTuple):
-    """One piece of code that is changed: the file below ``src/coramp``, and its text."""
-
-    path: str
-    before: str
-    after: str
-
-
-class Fault(NamedTuple):
-    """A fault: its name, its edits, and the run (options of ``coramp run``) that is to show it.
-
-    ``test`` is for a fault that hardly any run shows: it is that of a worked number.
-    """
-
-    name: str
-    edits: tuple[Edit, ...]
-    run: tuple[str, ...]
-    test: str = ""
-
+from tests.faults.fault import Edit, Fault
+from tests.faults.mixed_faults import MIXED_FAULTS
 
 EXACT = ("paper", "--engine", "exact")
 BUSY = (*EXACT, "--mainline", "2000", "--ramp", "900", "--horizon", "90", "--seed", "3")
@@ -154,29 +134,5 @@ FAULTS = (
         ),
         BUSY,
     ),
-    Fault(
-        "automated vehicles reckon with the leader's stop as if it braked at half of b",
-        (
-            Edit(
-                "mixed/on_board.py",
-                "leader_mps**2 / (2.0 * law.braking_mps2)",
-                "leader_mps**2 / (1.0 * law.braking_mps2)",
-            ),
-        ),
-        STEERED,
-        "tests/mixed/test_on_board.py::test_the_largest_speed_that_keeps_the_distance",
-    ),
-    Fault(
-        "who pushes in before a driver is not to blame for his running into it",
-        (
-            Edit(
-                "checker/among_drivers.py",
-                "return BY_AUTOMATED if pushed else BY_DRIVER",
-                "return BY_DRIVER",
-            ),
-        ),
-        STEERED,
-        "tests/checker/test_among_drivers.py"
-        "::test_a_driver_who_hits_whoever_pushed_in_is_not_to_blame",
-    ),
+    *MIXED_FAULTS,
 )

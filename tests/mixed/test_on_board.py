@@ -240,3 +240,34 @@ def test_who_is_ahead_and_who_is_beside():
     assert around.leader.tolist() == [-1, 3, 0, -1]
     assert around.front.tolist() == [-1, 0, -1, 0]
     assert around.rear.tolist() == [-1, 2, -1, 2]
+
+
+def accels_of(rows, told_mps2, changes=None):
+    """Returns the acceleration of each vehicle; ``changes`` is the one that changes lanes."""
+    users = users_of(rows)
+    changing = np.arange(len(rows)) == (-1 if changes is None else changes)
+    told = np.full(len(rows), told_mps2)
+    around = neighbours_of(users)
+    return driven_mps2(users, around, at_once(users), told, changing, ON_BOARD)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [(0.0, 15.0, True, True)],
+        [(80.0, 15.0, True, False), (60.0, 16.0, True, True)],
+        [(80.0, 5.0, True, False), (55.0, 16.0, True, True)],
+        [(120.0, 12.0, False, True)],
+    ],
+)
+def test_what_is_told_lowers_the_acceleration_and_never_raises_it(rows):
+    alone = accels_of(rows, math.inf)[-1]
+    assert accels_of(rows, alone + 1.0)[-1] == alone
+    assert accels_of(rows, alone - 0.5)[-1] == close(alone - 0.5)
+
+
+def test_who_is_behind_a_lane_change_brakes_with_it():
+    """One at 10 m/s comes in 12 m ahead of an automated one at 16 m/s, 7 m from its rear."""
+    rows = [(60.0, 10.0, False, True), (48.0, 16.0, True, True)]
+    assert accels_of(rows, math.inf)[1] > 0.0
+    assert accels_of(rows, math.inf, changes=0)[1] < -2.0

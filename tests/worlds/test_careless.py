@@ -68,6 +68,21 @@ def test_a_vehicle_breaks_down_where_and_when_it_is_said(strategy, share, place,
     assert np.isfinite(tables.outcome.passages.exit_s).all()
 
 
+def test_events_of_drivers_alone_are_recorded_too():
+    """Nobody is automated; without a fault there is nothing to tell."""
+    keys = {
+        "incidents.breakdown_s": 40.0,
+        "incidents.lasts_s": 10.0,
+        "behaviour.brakes_for_nothing_per_h": 200.0,
+    }
+    tables, row = driven(keys, "uncontrolled", share=0.0)
+    events = tables.safety_events["event"].to_list()
+    assert events.count("vehicle breaks down") == 1
+    assert events.count("driver brakes for nothing") >= 2
+    assert row["automated_vehicles"] is None
+    assert driven({}, "uncontrolled", share=0.0)[0].safety_events is None
+
+
 def test_the_next_to_reach_the_station_is_the_one_that_breaks_down():
     keys = {"incidents.breakdown_s": 40.0, "incidents.station_m": -100.0}
     tables, _ = driven(keys, share=1e-9)
@@ -136,6 +151,24 @@ def test_the_share_that_is_inattentive_has_that_in_sumos_routes(drivers):
     late = [kind.get("actionStepLength") for kind in kinds]
     assert set(late) == {None, "1.5"}
     assert np.mean([own is not None for own in late]) == pytest.approx(0.3, abs=0.06)
+
+
+@pytest.mark.parametrize(("strategy", "share"), [("uncontrolled", 0.0), ("mixed-slots", 0.5)])
+def test_who_looks_rarely_leaves_all_in_euler_steps(strategy, share):
+    """SUMO itself would take ballistic steps then: other drivers, and automated ones off plan."""
+    rarely = {"behaviour.inattentive_share": 0.3, "behaviour.inattentive_s": 1.5}
+    tables, row = driven(rarely, strategy, share, mainline_veh_h=1800.0)
+    rows, first = tables.outcome.driven.rows, tables.outcome.driven.first
+    drivers = np.ones(len(first) - 1, np.bool_)
+    if share:
+        drivers = ~tables.outcome.passages.automated
+        assert row["plan_error_m"] < 0.01
+    off_m = []
+    for k in np.flatnonzero(drivers).tolist():
+        time_s, station_m, speed_mps = rows[first[k] : first[k + 1], :3].T
+        steps = np.diff(time_s) < 0.1 + 1e-6
+        off_m += np.abs(np.diff(station_m) - speed_mps[1:] * np.diff(time_s))[steps].tolist()
+    assert np.quantile(off_m, 0.99) < 0.005  # but for lane changes, at which lanes begin
 
 
 def test_who_is_careless_at_a_share_is_so_at_a_larger_one_and_whatever_else_is_on():

@@ -154,6 +154,40 @@ def test_an_overdue_command_leads_to_a_fallback_that_is_counted_once():
     assert air.counts["fallbacks"] == 2
 
 
+def test_a_command_counts_from_when_it_was_given_not_from_when_it_arrived():
+    air = air_of({"commands.valid_s": 1.0, "commands.delay_s": 0.8})
+    users = users_at([-300.0])
+    air.tell(0.0, users, steering_of(users))
+    assert air.told(1.0, users)[0] == -1.0
+    assert air.told(1.2, users)[0] == np.inf
+
+
+def test_who_is_told_to_wait_may_not_merge():
+    air = air_of({"reports.loss": 0.1})
+    users = users_at([150.0], on_mainline=False)
+    waits = Steering(np.full(1, np.inf), np.zeros(1, np.bool_), ())
+    air.tell(0.0, users, waits)
+    assert not air.told(0.0, users)[1].any()
+    air.tell(0.2, users, waits._replace(may_merge=np.ones(1, np.bool_)))
+    assert air.told(0.2, users)[1].all()
+
+
+def test_who_has_left_the_road_is_not_known():
+    air = air_of({"reports.delay_s": 0.2})
+    air.heard(0.0, users_at([-300.0, 390.0]))
+    found = air.heard(0.4, users_at([-292.0]))
+    assert found.number.tolist() == [0]
+
+
+def test_a_report_is_not_carried_on_far_beyond_the_road():
+    """The road ends at 400 m, and 20 m later whoever is silent is taken to have left."""
+    air = air_of({"reports.period_s": 10.0, "reports.stale_s": 9.0})
+    users = users_at([380.0])
+    assert heard_m(air, 0.0, users) == pytest.approx(380.0)
+    assert heard_m(air, 1.8, users) == pytest.approx(416.0)
+    assert np.isnan(heard_m(air, 2.2, users)).all()
+
+
 def test_a_vehicle_that_goes_by_itself_may_merge_where_it_sees_room():
     air = air_of({"behaviour.disobeys_share": 1.0}, 1)
     assert air.told(1.0, users_at([150.0], on_mainline=False))[1].all()

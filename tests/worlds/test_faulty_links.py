@@ -96,6 +96,18 @@ def test_messages_with_a_drawn_latency_overtake_one_another():
     assert (np.diff(own) < 0.0).any()
 
 
+def test_messages_are_handed_over_in_the_order_in_which_they_arrived():
+    """Read at once, after all have come: each message is due when another link hands it over."""
+    one, other = (link_of(delay_s=0.5, delay_shape=1.0) for _ in range(2))
+    for link in (one, other):
+        for k in range(30):
+            link.send(0.1 * k, np.array([[0.0, 0.1 * k]]))
+    at_once = other.received(99.0)[:, 1].tolist()
+    by_and_by = [row[1] for now_s in np.arange(0.0, 30.0, 0.001) for row in one.received(now_s)]
+    assert at_once == by_and_by
+    assert at_once != sorted(at_once)
+
+
 def test_the_same_latency_for_all_keeps_the_order():
     rows, arrived_s = sent_over(link_of(delay_s=0.4), 50)
     assert np.allclose(arrived_s - rows[:, 1], 0.4)

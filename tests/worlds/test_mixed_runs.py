@@ -13,6 +13,7 @@ import coramp
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.metrics.mixed_figures import safety_events
 from coramp.mixed.situation import MixedSituation
+from coramp.road.lanes import MAINLINE
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.mixed_slots import MixedSlots
@@ -344,3 +345,28 @@ def test_automated_vehicles_that_nobody_coordinates_promise_nothing():
     )
     assert run.summary["automated_violations"] > 0
     assert run.broken_promises == []
+
+
+def test_no_automated_vehicle_leaves_the_mainline():
+    """In a jam SUMO's drivers pass others on the acceleration lane; it must not do so for these.
+
+    With this seed one was let past a driver there, and came back before another who was near.
+    """
+    jammed = {
+        "traffic.automated_share": 0.25,
+        "safety.time_gap_s": 0.5,
+        "safety.standstill_gap_m": 2.0,
+        "world.preset": "hard",
+        "behaviour.brakes_for_nothing_per_h": 40.0,
+        "behaviour.brake_s": 3.0,
+    }
+    flows = {"mainline_veh_h": 2200.0, "ramp_veh_h": 700.0, "seed": 71}
+    tables, row = driven(overrides=jammed, **flows, horizon_s=90.0)
+    outcome = tables.outcome
+    leaves = {True: 0, False: 0}
+    for k, automated in enumerate(outcome.passages.automated.tolist()):
+        lane = outcome.lane[outcome.driven.first[k] : outcome.driven.first[k + 1]]
+        leaves[automated] += int(((lane[:-1] == MAINLINE) & (lane[1:] != MAINLINE)).sum())
+    assert leaves[True] == 0
+    assert leaves[False] > 0
+    assert row["automated_violations"] == 0

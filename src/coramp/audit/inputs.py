@@ -57,7 +57,7 @@ def read_inputs(folder: Path, put_in_order: bool = False) -> Inputs:
     scenario = run.scenario
     known = set(run.vehicles["vehicle_id"].to_list())
     path = folder / f"{MESSAGES}.parquet"
-    if run.safety_events is not None and not path.exists():
+    if run.is_unplanned and not path.exists():
         raise CorampError(
             f"{folder}: automated vehicles drove among drivers here, and such runs keep no log "
             "that an audit could repeat; audit a run of automated vehicles alone, or of drivers "

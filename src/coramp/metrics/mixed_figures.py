@@ -65,10 +65,10 @@ def mixed_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> 
 
 
 def findings_in(outcome: Outcome, scenario: Scenario) -> Findings:
-    """Returns what the checker finds in the positions of a run of mixed traffic."""
+    """Returns what the checker finds in the positions of a run, of drivers alone too."""
     automated = outcome.passages.automated
     if automated is None:
-        return Findings((), (), ())
+        automated = np.zeros(len(outcome.passages), np.bool_)
     limits = limits_of(scenario, scenario.drivers[outcome.drivers])
     return findings_of(_seen(outcome, automated), limits, outcome.collided)
 
@@ -99,7 +99,7 @@ def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:
 
 
 def safety_events(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:
-    """Returns one row per collision, broken assumption and broken promise of mixed traffic."""
+    """Returns one row per collision, broken assumption, broken promise and event of the world."""
     found = findings_in(outcome, scenario)
     events = [(c.time_s, f"collision {c.cause}", c.rear, c.front) for c in found.collisions]
     events += [(b.time_s, f"driver {b.what}", b.rear, b.front) for b in found.broken]

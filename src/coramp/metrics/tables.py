@@ -137,8 +137,11 @@ class RunTables:
 
     @cached_property
     def safety_events(self) -> pl.DataFrame | None:
-        """One row per collision, broken assumption and broken promise, in mixed traffic alone."""
-        if self.outcome.passages.automated is None:
+        """One row per collision, broken assumption, broken promise and event of the world.
+
+        None where all are automated, and of drivers alone in a perfect world.
+        """
+        if self.outcome.passages.automated is None and not self.scenario.has_faults:
             return None
         return safety_events(self.outcome, self.scenario)
 

@@ -80,6 +80,14 @@ class RunRecords:
         return "automated" in columns and self.vehicles["automated"].n_unique() == 2
 
     @property
+    def is_unplanned(self) -> bool:
+        """Whether automated vehicles drove without plans: among drivers, or in a world that fails.
+
+        Drivers alone have events of such a world too.
+        """
+        return self.safety_events is not None and self.summary["automated_vehicles"] is not None
+
+    @property
     def flows(self) -> str:
         """The flows in words."""
         return f"{self.content['mainline_veh_h']:g} + {self.content['ramp_veh_h']:g} veh/h"
@@ -111,7 +119,7 @@ class RunRecords:
 
         Raises CorampError for a run in which nobody was coordinated, or where one is lost.
         """
-        if self.safety_events is not None:
+        if self.is_unplanned:
             raise CorampError(
                 f"vehicles among drivers drive without plans, so that there is none to {what}; "
                 f"{what} a run of automated vehicles alone"

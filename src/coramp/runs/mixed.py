@@ -7,7 +7,7 @@ from typing import Any
 from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import TABLES
-from coramp.strategies.base import Strategy
+from coramp.strategies.base import Strategy, steps_of_period
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
 from coramp.worlds.sumo.mixed_setup import safety_law_of
@@ -28,7 +28,7 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
         raise CorampError(
             f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, or {instead}"
         )
-    if coordinates_drivers(strategy) and (line := _lag_problem(scenario)):
+    if coordinates_drivers(strategy) and (line := _lag_problem(scenario, strategy)):
         raise CorampError(line)
     integrator = scenario.drivers[population].integrator
     if scenario.has_automated and integrator != "euler":
@@ -38,15 +38,16 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
         )
 
 
-def _lag_problem(scenario: Scenario) -> str:
+def _lag_problem(scenario: Scenario, strategy: type[Strategy]) -> str:
     """What is wrong with automated vehicles that react too late for this road, else nothing.
 
     Who passes the nose at v_R must still be able to stop before the acceleration lane ends:
-    v_R t + v_R^2 / (2 b) <= the lane, with t the reaction and the time until a command acts.
+    v_R t + v_R^2 / (2 b) <= the lane, with t the reaction, which is a period of commands at least,
+    and the time until a command acts.
     """
     actuators, speed_mps = scenario.actuators, scenario.ramp.speed_mps
     delay_s = actuators.dead_time_s + actuators.lag_s
-    law = safety_law_of(scenario, scenario.control.step_s)
+    law = safety_law_of(scenario, _period_s(scenario, strategy))
     left_m = law.lane_end_m - speed_mps**2 / (2.0 * law.stop_mps2)
     most_s = max(0.0, math.floor(100.0 * (left_m / speed_mps - law.reaction_s)) / 100.0)
     if delay_s == 0.0 or delay_s <= most_s:
@@ -58,6 +59,13 @@ def _lag_problem(scenario: Scenario) -> str:
         f"{scenario.ramp.acceleration_lane_m:g} ends; allowed are dead_time_s and lag_s of up to "
         f"{most_s:g} s together"
     )
+
+
+def _period_s(scenario: Scenario, strategy: type[Strategy]) -> float:
+    """How often (s) a strategy commands vehicles among drivers, in whole steps."""
+    own = scenario.strategy.get(strategy.name) or {}
+    asked_s = float(own.get("decision_s", getattr(strategy, "decision_s", 0.0)))
+    return steps_of_period(asked_s, scenario.control.step_s) * scenario.control.step_s
 
 
 def _asked_for(scenario: Scenario) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.errors import CorampError
 from coramp.scenarios.vehicle_checks import vehicle_problems
+from coramp.scenarios.world_checks import world_problems
 from coramp.strategies.parameters import wrong_settings, wrong_together
 from coramp.strategies.registry import strategy_named
 
@@ -23,7 +24,7 @@ def problems_of(scenario: "Scenario") -> list[str]:
     problems = [*_speed_problems(scenario), *_place_problems(scenario), *_flow_problems(scenario)]
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
     problems += [*_motion_problems(scenario), *_driver_problems(scenario)]
-    problems += vehicle_problems(scenario)
+    problems += [*vehicle_problems(scenario), *world_problems(scenario)]
     return problems or _planning_problems(scenario)
 
 

@@ -28,7 +28,8 @@ class Grid(Model):
     ``flows_veh_h``; left out, they are the scenario's own, or its listed arrivals.
     ``set`` gives lists of values for dotted keys of the scenario. ``drivers`` count only for
     strategies that leave vehicles to their drivers, whose engine is always sumo, and for those that
-    coordinate automated vehicles among drivers.
+    coordinate automated vehicles among drivers. ``times_seeds`` is how many times as many seeds as
+    the study's these runs have.
     """
 
     strategies: Names
@@ -37,6 +38,7 @@ class Grid(Model):
     flows_veh_h: Annotated[tuple[FlowPair, ...], Field(strict=False)] = ()
     drivers: Names = (DEFAULT_DRIVERS,)
     engine: str = "sumo"
+    times_seeds: Annotated[int, Field(ge=1, le=1000)] = 1
     set: dict[str, Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]] = Field(
         default={}
     )
@@ -202,7 +204,7 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
             except CorampError as error:
                 problems.update(dict.fromkeys(error.messages))
                 continue
-            for seed in range(1, 1 + (seeds if first.seed_matters else 1)):
+            for seed in range(1, 1 + (seeds * grid.times_seeds if first.seed_matters else 1)):
                 spec = replace(first, seed=seed)
                 specs.setdefault(spec.run_id, spec)
     if problems:
@@ -221,7 +223,13 @@ def _check_source(study: Study, seeds: int, label: str) -> None:
 
 def spec_of(study: Study, arguments: dict[str, Any]) -> RunSpec:
     """Returns the specification of one run of a study, with the first seed."""
-    return make_spec(study.source, horizon_s=study.horizon_s, blamed="", **arguments)
+    horizon_s = horizon_of(study, arguments["overrides"])
+    return make_spec(study.source, horizon_s=horizon_s, blamed="", **arguments)
+
+
+def horizon_of(study: Study, overrides: Mapping[str, Any]) -> float | None:
+    """Returns a study's horizon (s), None where it has none or a run sets its own."""
+    return None if "simulation.horizon_s" in overrides else study.horizon_s
 
 
 def _combinations(grid: Grid) -> Iterator[dict[str, Any]]:
@@ -262,7 +270,9 @@ def _populations(
 
 def count_runs(study: Study, seeds: int) -> int:
     """Returns how many runs a study has at most; what no seed changes counts with every seed."""
-    grids = sum(len(grid.flows) * sum(1 for _ in variants(grid)) for grid in study.runs)
+    grids = sum(
+        len(grid.flows) * sum(1 for _ in variants(grid)) * grid.times_seeds for grid in study.runs
+    )
     searches = sum(
         len(search.ramp_veh_h) * sum(1 for _ in variants(search)) * search.runs_at_most
         for search in study.searches

@@ -14,6 +14,7 @@ from coramp.studies.hostile_runs import (
     counted,
     total,
 )
+from coramp.studies.rare_layout import rare_tables
 from coramp.studies.statistics import rate_interval
 from coramp.studies.tables import Table, number, with_interval
 
@@ -60,10 +61,13 @@ Rows = tuple[tuple[str, ...], ...]
 
 
 def hostile_tables(good: pl.DataFrame) -> list[Table]:
-    """Returns collisions, delays against a perfect world, what else it costs, and conflicts."""
+    """Returns collisions, delays against a perfect world, what else it costs, and conflicts.
+
+    Then rates of rare events, where runs were drawn for these.
+    """
     cells = cells_of(good)
     if not cells:
-        return []
+        return rare_tables(good)
     return [
         collisions_table(cells),
         _where_collided(cells),
@@ -71,6 +75,7 @@ def hostile_tables(good: pl.DataFrame) -> list[Table]:
         _by_share("Delay lost to faults (s)", _faulty(cells), _lost, LOST),
         _costs(cells),
         _conflicts(cells),
+        *rare_tables(good),
     ]
 
 

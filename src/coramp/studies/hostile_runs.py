@@ -1,7 +1,7 @@
 """Runs by fault and share of automated vehicles, each beside the same run in a perfect world."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,8 +17,11 @@ from coramp.studies.statistics import Estimate, estimate, ratio_of_sums
 PERFECT = "perfect"
 PRESET = "world.preset"
 DRIVERS_ALONE, AUTOMATION_ALONE = "drivers alone", "automation alone"
+HORIZON = "simulation.horizon_s"
+BRAKES_PER_H = "behaviour.brakes_for_nothing_per_h"
+"""Runs that set both are drawn to be weighted: what is rare happens often in them."""
 NAMES: dict[str, Callable[[Any], str]] = {
-    "behaviour.brakes_for_nothing_per_h": lambda rate: f"braking for nothing ({rate:g}/h)",
+    BRAKES_PER_H: lambda rate: f"braking for nothing ({rate:g}/h)",
     "behaviour.never_yields_share": lambda share: f"never yielding ({100.0 * share:g} %)",
     "behaviour.inattentive_share": lambda share: f"inattentive ({100.0 * share:g} %)",
     "behaviour.silent_share": lambda share: f"silent ({100.0 * share:g} %)",
@@ -28,7 +31,11 @@ NAMES: dict[str, Callable[[Any], str]] = {
     "reports.burst_s": lambda burst_s: f"bursts of {burst_s:g} s",
 }
 """What a fault is called, by the key that makes it; the first that is set counts."""
-DETAILS = {"incidents.place": "on the {}", "behaviour.brake_mps2": "at {:g} m/s2"}
+DETAILS = {
+    "incidents.place": "on the {}",
+    "behaviour.brake_mps2": "at {:g} m/s2",
+    "behaviour.inattentive_s": "looking up each {:g} s",
+}
 """Keys that are told beside the name."""
 BY_CAUSE = ("collisions_by_automated", "collisions_by_driver", "collisions_among_drivers")
 
@@ -86,10 +93,11 @@ def cells_of(good: pl.DataFrame) -> list[Cell]:
     """Returns the runs by line and share: mixed traffic first, a perfect world before faults.
 
     Where all are automated there are no drivers: these runs are the last share of every population
-    that is run beside the same vehicles.
+    that is run beside the same vehicles. Runs that are drawn to be weighted are left out.
     """
     groups: dict[tuple[Line, float], BySeed] = {}
-    rows = [(_line_of(run), _share_of(run), run) for run in good.iter_rows(named=True)]
+    every = [run for run in good.iter_rows(named=True) if not is_drawn(run)]
+    rows = [(line_of(run), share_of(run), run) for run in every]
     among = dict.fromkeys(line for line, share, _ in rows if 0.0 < share < 1.0)
     for line, share, run in rows:
         beside = [other for other in among if _same_but_drivers(line, other)]
@@ -130,8 +138,18 @@ def _place(name: str, first: tuple[str, ...]) -> int:
     return first.index(name) if name in first else len(first)
 
 
-def _line_of(run: Run) -> Line:
-    said, share = overrides_of(run), _share_of(run)
+def is_drawn(run: Run) -> bool:
+    """Returns whether drivers brake for nothing more often in a run than they are taken to do.
+
+    Such runs are short, with a horizon of their own: they count with a weight, or not at all.
+    """
+    return {HORIZON, BRAKES_PER_H} <= overrides_of(run).keys()
+
+
+def line_of(run: Run, but: Collection[str] = ()) -> Line:
+    """Returns the line that a run belongs to, as if it did not set the keys in ``but``."""
+    said = {key: value for key, value in overrides_of(run).items() if key not in but}
+    share = share_of(run)
     faults = {key: value for key, value in said.items() if key.partition(".")[0] in TABLES}
     others = {key: v for key, v in said.items() if key not in faults and key != SHARE}
     who = str(run["strategy"])
@@ -142,7 +160,8 @@ def _line_of(run: Run) -> Line:
     return Line(who, run["drivers"] or "none", setting, flow, fault_name(faults))
 
 
-def _share_of(run: Run) -> float:
+def share_of(run: Run) -> float:
+    """Returns the share of vehicles that are automated in a run, as it was set."""
     share = overrides_of(run).get(SHARE)
     if share is None:
         return 0.0 if run["strategy"] == UNCONTROLLED else 1.0

@@ -16,7 +16,7 @@ from coramp.records.schemas import Row
 from coramp.records.staging import staged_folder
 from coramp.runs.running import RunSpec, make_spec, recorded
 from coramp.scenarios.loading import load_scenario
-from coramp.studies.definition import Study
+from coramp.studies.definition import Study, horizon_of
 from coramp.studies.overrides import overrides_of
 
 FOLDER = "shown"
@@ -116,7 +116,7 @@ def same_delays(row: Row, again: Row) -> bool:
 
 def _again(study: Study, row: Row) -> RunSpec:
     """A run of the study once more; cooperative ones need no simulator."""
-    listed = bool(load_scenario(study.source).arrivals)
+    listed, overrides = bool(load_scenario(study.source).arrivals), overrides_of(row)
     return make_spec(
         study.source,
         row["strategy"],
@@ -124,8 +124,8 @@ def _again(study: Study, row: Row) -> RunSpec:
         mainline_veh_h=None if listed else row["mainline_veh_h"],
         ramp_veh_h=None if listed else row["ramp_veh_h"],
         drivers=row["drivers"],
-        overrides=overrides_of(row),
+        overrides=overrides,
         seed=row["seed"],
-        horizon_s=study.horizon_s,
+        horizon_s=horizon_of(study, overrides),
         blamed="",
     )

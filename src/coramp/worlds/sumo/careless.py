@@ -11,10 +11,10 @@ from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import generator
 from coramp.mixed.users import RoadUsers
 from coramp.scenarios.model import Scenario
+from coramp.worlds.faults.brakings import due_s
 from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan
 from coramp.worlds.sumo.session import Session
 
-SECONDS_AN_HOUR = 3600.0
 STOPS_MPS2, STOPS_AT_MOST_MPS2 = 3.0, 4.0
 """A vehicle that breaks down rolls to a stop with this, and at a look too late with more."""
 STOPS_EARLY_S, STOPS_WITHIN_M = 0.3, 1.0
@@ -46,29 +46,23 @@ class Careless:
     seed: int
     stopped_until_s: dict[int, float] = field(default_factory=dict)
     events: list[tuple[float, str, int]] = field(default_factory=list)
-    _waits: np.random.Generator = field(init=False)
     _choices: np.random.Generator = field(init=False)
-    _next_brake_s: float = field(init=False)
+    _due_s: list[float] = field(init=False)
     _forced: dict[str, Forced] = field(default_factory=dict)
     _broken: bool = False
 
     def __post_init__(self) -> None:
-        """The first time at which a driver brakes for nothing is drawn."""
-        self._waits = generator(self.seed, "faults/careless/waits")
+        """When drivers brake for nothing is drawn, for as long as vehicles arrive."""
+        rate_per_h = self.scenario.behaviour.brakes_for_nothing_per_h
+        horizon_s = self.scenario.simulation.horizon_s
+        self._due_s = due_s(rate_per_h, self.seed, horizon_s).tolist()
         self._choices = generator(self.seed, "faults/careless/choices")
-        self._next_brake_s = self._wait_s()
 
     @property
     def is_needed(self) -> bool:
         """Whether anything of this can happen."""
         rate = self.scenario.behaviour.brakes_for_nothing_per_h
         return rate > 0.0 or self.scenario.incidents.breakdown_s is not None
-
-    def _wait_s(self) -> float:
-        rate_ph = self.scenario.behaviour.brakes_for_nothing_per_h
-        if rate_ph == 0.0:
-            return np.inf
-        return float(self._waits.exponential(SECONDS_AN_HOUR / rate_ph))
 
     def act(self, now_s: float, seen: "Road") -> None:
         """Lets happen what is due, and ends what is over."""
@@ -79,8 +73,8 @@ class Careless:
                 del self._forced[name]
             elif now_s >= forced.there_s:
                 self.session.hold(name, forced.speed_mps)
-        if now_s >= self._next_brake_s and self._brake_for_nothing(now_s, seen):
-            self._next_brake_s += self._wait_s()
+        if self._due_s and now_s >= self._due_s[0] and self._brake_for_nothing(now_s, seen):
+            del self._due_s[0]
         incidents = self.scenario.incidents
         due = incidents.breakdown_s is not None and now_s >= incidents.breakdown_s
         if due and not self._broken:

@@ -96,8 +96,7 @@ class RunFiles:
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
             *self._loops(folder / SUMO_LOOPS),
         ]
-        if self._ballistic:
-            result.append("--step-method.ballistic")
+        result += self._step_method
         if self._sampled or self._keep_in is not None:
             result += ["--fcd-output", str(folder / "fcd.parquet"), "--precision", "4"]
             result += ["--tripinfo-output", str(folder / "tripinfo.xml")]
@@ -106,6 +105,14 @@ class RunFiles:
         else:
             result += ["--tripinfo-output.write-unfinished", "--tripinfo-output.write-undeparted"]
         return result
+
+    @property
+    def _step_method(self) -> tuple[str, str]:
+        """How SUMO integrates, said outright: left out, it is ballistic where drivers look rarely.
+
+        SUMO takes ballistic steps for all as soon as one type's actions are rarer than its steps.
+        """
+        return "--step-method.ballistic", "true" if self._ballistic else "false"
 
     def keep(self) -> None:
         """Copies the files to where they are to be kept, with a command that uses them."""
@@ -122,7 +129,7 @@ class RunFiles:
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
             *self._loops(Path(SUMO_LOOPS)),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
-            *(("--step-method.ballistic",) if self._ballistic else ()),
+            *self._step_method,
         ]
         (self._keep_in / SUMO_COMMAND).write_text(" ".join(command) + "\n")
 

@@ -97,12 +97,14 @@ class MixedPlant:
         number = users.number[own]
         new = np.isnan(self._sent_mps[number])
         for i in own[new].tolist():
+            if users.on_mainline[i]:
+                self.session.take_over(names[i])
+                continue
             self.session.take_over_among_drivers(names[i])
-            if not users.on_mainline[i]:
-                self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
+            self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
         for i in own[users.on_mainline[own]].tolist():
             if int(users.number[i]) in self._changing:
-                self.session.take_over_among_drivers(names[i])
+                self.session.take_over(names[i])
                 self._changing.discard(int(users.number[i]))
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
