@@ -99,7 +99,7 @@ class Air:
         """Returns how old what is known of vehicles is, by its stamps: 0 if all is perfect."""
         if self.is_perfect:
             return np.zeros(len(number))
-        return np.clip(now_s - self._known[number, STAMP], 0.0, None)
+        return np.asarray(np.maximum(0.0, now_s - self._known[number, STAMP]))
 
     def _report(self, now_s: float, users: RoadUsers) -> None:
         """Sends reports of those whose time has come, with the errors of the moment."""
