@@ -149,9 +149,7 @@ ADVERSARIES = {
 
 @pytest.mark.parametrize("name", ADVERSARIES)
 @pytest.mark.parametrize("preset", [None, "hard"])
-def test_whatever_agents_ask_for_they_cause_no_collision_and_keep_their_promise(
-    made, name, preset
-):
+def test_whatever_agents_ask_for_they_cause_no_collision_and_keep_their_promise(made, name, preset):
     overrides = {"safety.time_gap_s": 0.5, "safety.standstill_gap_m": 2.0}
     overrides |= {"world.preset": preset} if preset else {}
     env = made(**BUSY, overrides=overrides, longest_s=60.0, **SHORT)
@@ -343,4 +341,4 @@ def test_figures_are_those_of_an_episode_that_has_ended(made):
     env.reset(seed=1)
     with pytest.raises(CorampError, match="figures: there are none before an episode has ended"):
         env.figures()
-    assert FEATURES == env.observation_space.shape[1]
+    assert env.observation_space.shape[1] == FEATURES

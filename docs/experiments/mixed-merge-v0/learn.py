@@ -1,7 +1,7 @@
 """Trains a policy for coramp/MixedMerge-v0 by the cross-entropy method, and judges policies.
 
 ``python learn.py train SEED`` trains for about 200 s of one core and writes ``policy-SEED.json``,
-``python learn.py judge`` prints the table of the page.
+``python learn.py judge`` judges all, writes ``judged.json`` and prints the table of the page.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 
-import coramp.gym  # registers the environment
+import coramp.gym  # noqa: F401 - registers the environment
 
 HERE = Path(__file__).parent
 ENVIRONMENT = "coramp/MixedMerge-v0"
@@ -121,14 +121,18 @@ def policies():
     return {**found, "mixed-slots": lambda _: None}
 
 
-def judged(seeds=JUDGED):
-    """Returns by policy the figures of each seed."""
+def judged(names=None, seeds=JUDGED):
+    """Returns by policy the figures of each seed: the keys of ``SHOWN``."""
     env, found = made(), {}
     for name, policy in policies().items():
+        if names is not None and name not in names:
+            continue
         found[name] = []
         for seed in seeds:
             driven(env, policy, seed)
-            found[name].append(env.figures())
+            figures = env.figures()
+            assert figures["collisions_by_automated"] == figures["automated_violations"] == 0
+            found[name].append({key: round(figures[key], 6) for key in SHOWN})
     env.close()
     return found
 
@@ -164,7 +168,9 @@ def main(words):
             encoding="utf-8",
         )
     else:
-        print(table(judged()))
+        found = judged()
+        (HERE / "judged.json").write_text(json.dumps(found) + "\n", encoding="utf-8")
+        print(table(found))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from coramp.strategies.registry import strategies, strategy_named
 
 Floats32 = npt.NDArray[np.float32]
 
+SHARE = "traffic.automated_share"
 WARM_UP_S = 30.0
 """The only agent is drawn from those scheduled later than this."""
 FIRST_DRAWN, LAST_DRAWN = 1_000_000, 2**31 - 1
@@ -106,24 +107,16 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         Flows, share and horizon are the scenario's own where they are None.
         """
         _check(agents, slots, period_s, braking_cost_s, longest_s)
-        if not coordinates_drivers(strategy_named(others)):
-            able = ", ".join(
-                name for name, kind in strategies().items() if coordinates_drivers(kind)
-            )
-            raise CorampError(
-                f"others: {others} coordinates nobody among drivers; allowed is {able}"
-            )
-        settings = dict(overrides or {})
-        if automated_share is not None:
-            settings = {"traffic.automated_share": float(automated_share), **settings}
+        share = {} if automated_share is None else {SHARE: float(automated_share)}
         spec = make_spec(
             scenario,
-            others,
+            _coordinating(others),
             mainline_veh_h=mainline_veh_h,
             ramp_veh_h=ramp_veh_h,
             drivers=drivers,
-            overrides=settings,
+            overrides={**share, **(overrides or {})},
             horizon_s=horizon_s,
+            blamed="MixedMerge-v0",
         )
         self._scenario = spec.scenario
         self._population = spec.drivers or drivers or self._scenario.traffic.drivers
@@ -266,6 +259,14 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
             "hard_brakings": episode.hard_brakings,
             "lost_s": episode.lost_s,
         }
+
+
+def _coordinating(others: str) -> str:
+    """Returns the name of a strategy; raises CorampError if that cannot coordinate among drivers."""
+    if not coordinates_drivers(strategy_named(others)):
+        able = ", ".join(name for name, kind in strategies().items() if coordinates_drivers(kind))
+        raise CorampError(f"others: {others} coordinates nobody among drivers; allowed is {able}")
+    return others
 
 
 def _decisions_of(period_s: float, decision_s: float) -> int:
