@@ -128,7 +128,7 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         motion = self._scenario.motion
         self._brake_mps2, self._speed_up_mps2 = motion.comfort_mps2, FollowingLaw().speed_up_mps2
         self._episode: Episode | None = None
-        self._agents, self._since_s = NOTHING.number, 0.0
+        self._agents, self._since_s, self._paid_s = NOTHING.number, math.inf, 0.0
         row = (self._slots,) if self._everyone else ()
         self.action_space = spaces.Box(-1.0, 1.0, (*row, 2), np.float32)
         self.observation_space = spaces.Box(-1.0, 1.0, (*row, FEATURES), np.float32)
@@ -155,7 +155,7 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         episode = self._episode
         if episode is None or episode.ended:
             raise CorampError("step: no episode runs; call reset() first")
-        asked, before = self._asked(action), self._cost(episode)
+        asked = self._asked(action)
         try:
             for _ in range(self._decisions):
                 self._go_on(episode, asked)
@@ -164,7 +164,8 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         except CorampError:
             self.close()
             raise
-        reward = before - self._cost(episode)
+        before_s, self._paid_s = self._paid_s, self._cost_s(episode)
+        reward = before_s - self._paid_s
         cut_off = episode.is_cut_off
         return self._observation(), reward, episode.ended and not cut_off, cut_off, self._info()
 
@@ -200,6 +201,7 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         late = None if self._everyone else own[int(self.np_random.integers(len(own)))]
         episode = Episode(self._scenario, self._strategy, self._population, traffic, late)
         self._episode, self._agents = episode, episode.agents(self._slots)
+        self._since_s, self._paid_s = math.inf, 0.0
         while not episode.ended and len(self._agents) == 0:
             self._go_on(episode, NOTHING)
         self._since_s = episode.moment.now_s
@@ -233,8 +235,8 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
         """The agents' numbers among the arrivals."""
         return self._episode.moment.seen.number[self._agents] if self._episode else NOTHING.number
 
-    def _cost(self, episode: Episode) -> float:
-        """What has been lost so far (s): a vehicle where all count, else in sum."""
+    def _cost_s(self, episode: Episode) -> float:
+        """What has been lost so far: a vehicle where all count, else in sum."""
         cost_s = episode.lost_s + self._braking_cost_s * episode.hard_brakings
         return cost_s / len(episode.run.arrivals) if self._everyone else cost_s
 
@@ -262,7 +264,7 @@ class MixedMerge(gymnasium.Env[Floats32, Floats32]):
 
 
 def _coordinating(others: str) -> str:
-    """Returns the name of a strategy; raises CorampError if that cannot coordinate among drivers."""
+    """Returns the name of a strategy; raises CorampError if it cannot coordinate among drivers."""
     if not coordinates_drivers(strategy_named(others)):
         able = ", ".join(name for name, kind in strategies().items() if coordinates_drivers(kind))
         raise CorampError(f"others: {others} coordinates nobody among drivers; allowed is {able}")

@@ -42,7 +42,8 @@ class Episode:
 
     ``late`` is the first number that may be the only agent, None if all ramp vehicles are agents.
     ``cut`` counts decisions at which an agent was driven slower than it was told, ``refused`` those
-    at which one on the acceleration lane was told to merge and did not.
+    at which one on the acceleration lane was told to merge and did not. ``lost_s`` and
+    ``hard_brakings`` are those of all so far, or of the only agent and those near behind it.
     """
 
     _open: ClassVar["weakref.ref[Episode] | None"] = None
@@ -80,6 +81,7 @@ class Episode:
         self._moments = self.run.decisions()
         self.moment: Moment = next(self._moments)
         self._take_in()
+        self.lost_s += float(self.losses.lost_s[self._counts()].sum())
 
     def close(self) -> None:
         """Ends SUMO and removes its files."""
@@ -209,6 +211,4 @@ class Episode:
 
         It is to have ended, and not been closed.
         """
-        scenario = self._scenario
-        end_s = self.moment.now_s + self.run.plant.period_s
-        return tables_of(self.run.outcome(end_s), scenario).metrics
+        return tables_of(self.run.outcome(self.moment.now_s), self._scenario).metrics
