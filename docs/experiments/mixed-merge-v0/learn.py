@@ -1,6 +1,6 @@
 """Trains a policy for coramp/MixedMerge-v0 by the cross-entropy method, and judges policies.
 
-``python learn.py train SEED`` trains for about 200 s of one core and writes ``policy-SEED.json``,
+``python learn.py train SEED`` trains for about 150 s of one core and writes ``policy-SEED.json``,
 ``python learn.py judge`` judges all, writes ``judged.json`` and prints the table of the page.
 """
 
@@ -21,7 +21,7 @@ SETTINGS = {
     "ramp_veh_h": 700.0,
     "overrides": {"safety.time_gap_s": 0.5, "safety.standstill_gap_m": 2.0},
 }
-LONGEST_S = 200.0
+LONGEST_S = 150.0
 POPULATION, ELITE, EPISODES = 12, 3, 3
 """Policies a generation, those that make the next one, and episodes that each of them drives."""
 TRAINED_FROM = 1_000_000
@@ -31,9 +31,10 @@ VALIDATED = range(2000, 2008)
 """Seeds on which the best generation of a training is chosen."""
 JUDGED = range(1, 21)
 """Seeds that nothing was trained or chosen on."""
-SEEN = [2, 3, 6, 7, 14, 15, 18, 19]
-"""Own speed and the lane's; gap and speed of the leader, and of who passes before and after."""
-SPREAD = np.array([1.0, 1.0, 1.0, 4.0, 2.0, 4.0, 2.0, 4.0, 2.0])
+SEEN = [6, 7, 14, 15]
+"""Distance and speed of the vehicle ahead on the ramp, and of the one that is to pass before."""
+SPREAD = np.array([1.0, 4.0, 2.0, 4.0, 2.0])
+"""How widely the first generation is drawn: a constant, then a weight for each number seen."""
 SHOWN = {
     "delay_s": "delay of all (s)",
     "driver_hard_brakings_3": "hard braking of drivers",
@@ -43,7 +44,7 @@ SHOWN = {
 
 def made(**more):
     """Returns an environment of the example."""
-    return gymnasium.make(ENVIRONMENT, **SETTINGS, **more).unwrapped
+    return gymnasium.make(ENVIRONMENT, **{**SETTINGS, **more}).unwrapped
 
 
 def linear(weights):
@@ -66,18 +67,21 @@ def driven(env, policy, seed):
     return total
 
 
-def mean_return(env, policy, seeds):
-    """Returns the mean sum of rewards over seeds."""
-    return float(np.mean([driven(env, policy, seed) for seed in seeds]))
+def value_of(env, policy, seeds):
+    """Returns the mean of -log(1 + cost in s) over seeds.
+
+    Otherwise the few episodes in which traffic breaks down would outweigh all others.
+    """
+    return float(np.mean([-np.log1p(-driven(env, policy, seed)) for seed in seeds]))
 
 
 def train(seed, generations=1000, validated=VALIDATED, longest_s=LONGEST_S):
-    """Returns the best weights on the validation seeds, and the curve: (episodes, s, return)."""
+    """Returns the best weights on the validation seeds, and the curve: (episodes, s, value)."""
     env, random = made(longest_s=TRAINED_LONGEST_S), np.random.default_rng(seed)
     started = time.process_time()
     mean, spread, curve, best = np.zeros(len(SPREAD)), SPREAD.copy(), [], None
     for generation in range(generations):
-        value = mean_return(env, linear(mean), validated)
+        value = value_of(env, linear(mean), validated)
         if not curve or value > max(row[2] for row in curve):
             best = mean
         curve.append((generation * POPULATION * EPISODES, time.process_time() - started, value))
@@ -86,7 +90,7 @@ def train(seed, generations=1000, validated=VALIDATED, longest_s=LONGEST_S):
             break
         seeds = random.integers(TRAINED_FROM, 2**31 - 1, EPISODES).tolist()
         drawn = mean + spread * random.normal(size=(POPULATION, len(mean)))
-        values = [mean_return(env, linear(weights), seeds) for weights in drawn]
+        values = [value_of(env, linear(weights), seeds) for weights in drawn]
         chosen = drawn[np.argsort(values)[-ELITE:]]
         mean = 0.3 * mean + 0.7 * chosen.mean(axis=0)
         spread = 0.3 * spread + 0.7 * chosen.std(axis=0)
@@ -109,6 +113,12 @@ def at_random(random):
     return lambda seen: random.uniform(-1.0, 1.0, (len(seen), 2))
 
 
+def behind_who_passes_before(seen):
+    """Follows the vehicle that is to pass before at 12 m, 2 m/s slower, and never brakes hard."""
+    accel = 8.0 * (seen[:, 14] - 0.12) + 4.0 * (seen[:, 15] - 0.2)
+    return np.column_stack([np.clip(accel, -0.15, 1.0), np.ones(len(seen))]).astype(np.float32)
+
+
 def policies():
     """Returns all policies of the table by name."""
     found = {
@@ -116,8 +126,9 @@ def policies():
         "as fast as it may, merges": constant(1.0),
         "keeps its speed, merges": constant(0.0),
     }
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         found[f"trained, seed {seed}"] = linear(np.array(stored(seed)["weights"]))
+    found["rule: gently behind who is to pass before"] = behind_who_passes_before
     return {**found, "mixed-slots": lambda _: None}
 
 
