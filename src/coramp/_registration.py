@@ -6,6 +6,7 @@ from typing import Any
 ENVIRONMENTS = {
     "coramp/Merge-v0": "coramp.gym:MergeEnv",
     "coramp/Merge-v1": "coramp.gym_v1:MergeSlots",
+    "coramp/MixedMerge-v0": "coramp.gym_mixed.environment:MixedMerge",
 }
 
 

@@ -58,16 +58,25 @@ def free_flow_of_each_s(passages: Passages, traits: FloatArray, scenario: Scenar
 @kernel
 def own_free_flow_s(traits: FloatArray, on_ramp: bool, packed_rules: FloatArray) -> float:
     """Returns the time (s) of one vehicle through the zone if it were alone."""
+    end_m = unpacked(packed_rules).road.mainline_end_m
+    return free_time_to_s(end_m, traits, on_ramp, packed_rules)
+
+
+@kernel
+def free_time_to_s(
+    station_m: float, traits: FloatArray, on_ramp: bool, packed_rules: FloatArray
+) -> float:
+    """Returns the time (s) of one vehicle from its stream's start to a station if it were alone."""
     rules = unpacked(packed_rules)
     road, cruise = rules.road, cruise_mps(traits, rules)
     if not on_ramp:
-        return float((road.mainline_end_m - road.mainline_start_m) / cruise)
+        return float((station_m - road.mainline_start_m) / cruise)
     out = np.empty((MAX_PIECES, 4))
     ramp_mps = min(road.ramp_speed_mps, traits[TOP_SPEED])
     n = begin(out, 0.0, road.ramp_start_m, ramp_mps)
     n = drive(out, n, 0.0, -road.ramp_start_m / ramp_mps)
     n = speed_up(out, n, cruise, rules.motion.free_acceleration_mps2, traits)
-    return float(time_at_station(out[:n], road.mainline_end_m))
+    return float(time_at_station(out[:n], station_m))
 
 
 def type_figures(

@@ -95,6 +95,12 @@ class Air:
                 self._known[number] = row
         return self._carried_on(now_s, users)
 
+    def age_s(self, now_s: float, number: IntArray) -> FloatArray:
+        """Returns how old what is known of vehicles is, by its stamps: 0 if all is perfect."""
+        if self.is_perfect:
+            return np.zeros(len(number))
+        return np.asarray(np.maximum(0.0, now_s - self._known[number, STAMP]))
+
     def _report(self, now_s: float, users: RoadUsers) -> None:
         """Sends reports of those whose time has come, with the errors of the moment."""
         period_s = self.scenario.reports.period_s or 0.0

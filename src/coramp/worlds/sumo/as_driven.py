@@ -21,15 +21,20 @@ def outcome_as_driven(
     arrivals: Sequence[Arrival],
     samples: Samples,
     files: RunFiles,
+    cut_off_s: float | None = None,
 ) -> Outcome:
-    """Returns what happened: who passed when and how each drove, at SUMO's steps."""
+    """Returns what happened: who passed when and how each drove, at SUMO's steps.
+
+    ``cut_off_s`` is when SUMO was ended before everybody had left, if not at the scenario's end.
+    """
     finished = files.finished()
-    step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
+    step_s = scenario.control.step_s
+    cap_s = cap_step_of(scenario) * step_s if cut_off_s is None else cut_off_s
     entry_s, exit_s = _passing_times(samples, arrivals, finished, scenario.mainline.end_m, step_s)
     first, rows = pieces_of_samples(*samples.motion, len(arrivals))
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
-    end_s = float(np.max(exit_s, initial=0.0)) if left else cap_step * step_s
+    end_s = float(np.max(exit_s, initial=0.0)) if left else cap_s
     lanes = seen_history(
         samples.vehicle, samples.on_mainline, samples.time_s, until_s(exit_s, end_s)
     )

@@ -1,16 +1,20 @@
 """Automated vehicles among SUMO's own drivers: they are commanded anew each period."""
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
+from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.laws import OnBoardLaws
-from coramp.mixed.on_board import driven_mps2, may_change_lane, neighbours_of
-from coramp.mixed.situation import MixedSituation, MixedStrategy, Places
+from coramp.mixed.on_board import Ahead, driven_mps2, may_change_lane, neighbours_of
+from coramp.mixed.situation import MixedSituation, MixedStrategy, Places, Steering
 from coramp.mixed.users import RoadUsers
 from coramp.records.outcome import Outcome
 from coramp.scenarios.model import Scenario
@@ -42,48 +46,137 @@ def run_mixed(
     options: SumoOptions,
 ) -> Outcome:
     """Returns what happened with automated vehicles under a strategy, and drivers beside them."""
+    with tempfile.TemporaryDirectory(prefix="coramp-") as name:
+        with begun(scenario, strategy, population, seed, options, Path(name)) as run:
+            for moment in run.decisions():
+                run.carry_out(moment)
+        run.files.keep()
+        return run.outcome()
+
+
+@contextmanager
+def begun(
+    scenario: Scenario,
+    strategy: MixedStrategy,
+    population: str,
+    seed: int,
+    options: SumoOptions,
+    folder: Path,
+) -> Iterator["MixedRun"]:
+    """Starts SUMO, with its files in a folder, and hands over the run; SUMO ends with it."""
     drivers = scenario.drivers[population]
     arrivals = arrivals_of(scenario, seed)
     plan = driver_road_plan(scenario, drivers)
     step_s = scenario.control.step_s
     period_steps = steps_of_period(strategy.decision_s, step_s)
     automated = automated_of(scenario, arrivals, seed)
-    with tempfile.TemporaryDirectory(prefix="coramp-") as name:
-        files = RunFiles(Path(name), scenario, plan, seed, options, ballistic=False, sampled=True)
-        traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
-        actuators = actuators_of(scenario, len(arrivals))
-        types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
-        files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
-        with Session(files.options(), step_s, options.gui, options.tell) as session:
-            plant = MixedPlant(
-                session,
-                plan.lane_starts_m(),
-                Able.of(scenario, arrivals, automated),
-                period_steps,
-                step_s,
-                types.min_gap_m,
-                actuators,
-            )
-            heard = automated | connected_of(scenario, arrivals, seed)
-            laws = laws_of(scenario, drivers, plant.period_s)
-            air = Air(scenario, heard, automated, seed)
-            control = Control(strategy, laws, air, notes=notes_of(options, air))
-            careless = Careless(scenario, session, seed)
-            control.drive(plant, careless, cap_step_of(scenario))
-        files.keep()
-        samples = files.samples(arrivals)
-        outcome = outcome_as_driven(scenario, arrivals, samples, files)
-    passages = replace(outcome.passages, plan_error_m=plant.largest_error_m, automated=automated)
-    notes = control.notes or Notes(None, None)
-    return replace(
-        outcome,
-        passages=passages,
-        drivers=population,
-        messages_of_air=control.air.counts,
-        world_events=(*careless.events, *air.faults(passages.entry_s, outcome.until_s)),
-        heard=None if notes.heard is None else notes.heard.columns(),
-        on_board=None if notes.on_board is None else notes.on_board.columns(),
-    )
+    files = RunFiles(folder, scenario, plan, seed, options, ballistic=False, sampled=True)
+    traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
+    actuators = actuators_of(scenario, len(arrivals))
+    types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
+    files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
+    with Session(files.options(), step_s, options.gui, options.tell) as session:
+        plant = MixedPlant(
+            session,
+            plan.lane_starts_m(),
+            Able.of(scenario, arrivals, automated),
+            period_steps,
+            step_s,
+            types.min_gap_m,
+            actuators,
+        )
+        heard = automated | connected_of(scenario, arrivals, seed)
+        laws = laws_of(scenario, drivers, plant.period_s)
+        air = Air(scenario, heard, automated, seed)
+        control = Control(strategy, laws, air, notes=notes_of(options, air))
+        careless = Careless(scenario, session, seed)
+        yield MixedRun(scenario, population, arrivals, files, plant, control, careless)
+
+
+class Moment(NamedTuple):
+    """All at one decision: where everybody is, what of it is known, and what the strategy answers.
+
+    ``able`` is who is on the acceleration lane and can leave it. ``steering`` has one entry for
+    each of those ``seen``, and is None where nobody automated is on the road, or nobody is seen.
+    """
+
+    now_s: float
+    names: list[str]
+    able: BoolArray
+    users: RoadUsers
+    seen: RoadUsers
+    steering: Steering | None
+
+
+class Driven(NamedTuple):
+    """What vehicles were told at a decision and what they did, one entry a user.
+
+    ``told_mps2`` is how much each was to speed up at most, ``wishes`` who on the acceleration lane
+    was to merge; ``accel_mps2`` is how each is driven, ``changes`` who changes lanes.
+    """
+
+    told_mps2: FloatArray
+    wishes: BoolArray
+    accel_mps2: FloatArray
+    changes: BoolArray
+
+
+@dataclass
+class MixedRun:
+    """A run that SUMO has begun. Each moment is to be carried out before the next one is taken."""
+
+    scenario: Scenario
+    population: str
+    arrivals: list[Arrival]
+    files: RunFiles
+    plant: MixedPlant
+    control: "Control"
+    careless: Careless
+
+    def decisions(self) -> Iterator[Moment]:
+        """Lets SUMO run until it is empty, and stops at each decision."""
+        plant, careless = self.plant, self.careless
+        step, cap_step = 0, cap_step_of(self.scenario)
+        while step < cap_step and (step == 0 or plant.session.vehicles_left()):
+            step = min(cap_step, step + plant.period_steps)
+            plant.session.step_to(step)
+            names, on_lane, users = plant.users()
+            now_s = step * plant.step_s
+            careless.act_among(now_s, names, users)
+            able = on_lane & ~careless.broken_down(now_s, users.number)
+            yield self.control.decided(now_s, names, able, users)
+
+    def carry_out(self, moment: Moment) -> Driven | None:
+        """Tells vehicles what the moment has, and drives them for a period; None without any."""
+        users = moment.users
+        if not users.automated.any():
+            return None
+        driven = self.control.driven(moment, self.plant)
+        accel_mps2 = self.careless.with_breakdown(moment.now_s, users, driven.accel_mps2)
+        self.control.note(moment, self.plant.ahead(users), accel_mps2, driven.changes)
+        self.plant.command(moment.names, users, accel_mps2, driven.changes)
+        return driven
+
+    def outcome(self, end_s: float | None = None) -> Outcome:
+        """Returns what happened once SUMO has ended, at ``end_s`` where it was cut off early."""
+        samples, passed = self.files.samples(self.arrivals), self.plant
+        outcome = outcome_as_driven(self.scenario, self.arrivals, samples, self.files, end_s)
+        passages = replace(
+            outcome.passages,
+            plan_error_m=passed.largest_error_m,
+            automated=passed.able.automated,
+        )
+        air, notes = self.control.air, self.control.notes or Notes(None, None)
+        faults = air.faults(passages.entry_s, outcome.until_s)
+        return replace(
+            outcome,
+            passages=passages,
+            drivers=self.population,
+            messages_of_air=air.counts,
+            world_events=(*self.careless.events, *faults),
+            heard=None if notes.heard is None else notes.heard.columns(),
+            on_board=None if notes.on_board is None else notes.on_board.columns(),
+        )
 
 
 @dataclass
@@ -99,58 +192,47 @@ class Control:
     places: Places = field(default=())
     notes: Notes | None = None
 
-    def drive(self, plant: MixedPlant, careless: Careless, cap_step: int) -> None:
-        """Lets SUMO run until it is empty, commanding once a period."""
-        step = 0
-        while step < cap_step and (step == 0 or plant.session.vehicles_left()):
-            step = min(cap_step, step + plant.period_steps)
-            plant.session.step_to(step)
-            names, on_lane, users = plant.users()
-            now_s = step * plant.step_s
-            careless.act_among(now_s, names, users)
-            if users.automated.any():
-                able = on_lane & ~careless.broken_down(now_s, users.number)
-                accel_mps2, changes = self.commands(now_s, plant, able, users)
-                accel_mps2 = careless.with_breakdown(now_s, users, accel_mps2)
-                if self.notes is not None:
-                    known = self.air, self.places, self.laws
-                    driven = accel_mps2, changes
-                    self.notes.driven(now_s, users, plant.ahead(users), driven, known)
-                plant.command(names, users, accel_mps2, changes)
+    def decided(self, now_s: float, names: list[str], able: BoolArray, users: RoadUsers) -> Moment:
+        """Returns what the strategy answers to what it has heard."""
+        if not users.automated.any():
+            return Moment(now_s, names, able, users, users, None)
+        laws, seen = self.laws, self.air.heard(now_s, users)
+        if len(seen.number) == 0:
+            return Moment(now_s, names, able, users, seen, None)
+        around = neighbours_of(seen)
+        situation = MixedSituation(now_s, laws.period_s, seen, around, laws.gaps, laws.road)
+        steering = self.strategy.steer(situation, self.places)
+        self.places = steering.places
+        return Moment(now_s, names, able, users, seen, steering)
 
-    def commands(
-        self, now_s: float, plant: MixedPlant, on_lane: BoolArray, users: RoadUsers
-    ) -> tuple[FloatArray, BoolArray]:
-        """Returns the acceleration (m/s2) of each vehicle and who changes lanes.
+    def driven(self, moment: Moment, plant: MixedPlant) -> Driven:
+        """Returns what vehicles are told, as far as it arrives, and what they do on board.
 
-        Only who is ``on_lane``, the acceleration lane, and able to may do that.
+        Only who is ``able`` to changes lanes.
         """
-        most_mps2, may_merge = self._told(now_s, users)
+        users = moment.users
+        if moment.steering is not None:
+            self.air.tell(moment.now_s, moment.seen, moment.steering)
+        most_mps2, may_merge = self.air.told(moment.now_s, users)
+        if self.notes is not None:
+            self.notes.told(moment.now_s, users, moment.seen, most_mps2, self.air)
         around, ahead = neighbours_of(users), plant.ahead(users)
-        wishes = may_merge & on_lane & users.automated
+        wishes = may_merge & moment.able & users.automated
         accel_mps2 = driven_mps2(users, around, ahead, most_mps2, wishes, self.laws)
         if not wishes.any():
-            return accel_mps2, wishes
+            return Driven(most_mps2, wishes, accel_mps2, wishes)
         slower_mps = users.speed_mps + np.minimum(0.0, accel_mps2) * plant.period_s
         slowest_mps = np.minimum(slower_mps, ahead.speed_mps)
         changes = np.zeros(len(users.number), np.bool_)
         for own in np.flatnonzero(wishes).tolist():
             changes[own] = may_change_lane(users, own, around, ahead, slowest_mps[own], self.laws)
-        return driven_mps2(users, around, ahead, most_mps2, changes, self.laws), changes
+        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, changes, self.laws)
+        return Driven(most_mps2, wishes, accel_mps2, changes)
 
-    def _told(self, now_s: float, users: RoadUsers) -> tuple[FloatArray, BoolArray]:
-        """What vehicles are told: by the strategy, from what it has heard, as far as it arrives."""
-        laws, seen = self.laws, self.air.heard(now_s, users)
-        if len(seen.number):
-            steering = self.strategy.steer(
-                MixedSituation(
-                    now_s, laws.period_s, seen, neighbours_of(seen), laws.gaps, laws.road
-                ),
-                self.places,
-            )
-            self.places = steering.places
-            self.air.tell(now_s, seen, steering)
-        told_mps2, may_merge = self.air.told(now_s, users)
+    def note(
+        self, moment: Moment, ahead: Ahead, accel_mps2: FloatArray, changes: BoolArray
+    ) -> None:
+        """Notes what vehicles do, if anything is noted."""
         if self.notes is not None:
-            self.notes.told(now_s, users, seen, told_mps2, self.air)
-        return told_mps2, may_merge
+            known, driven = (self.air, self.places, self.laws), (accel_mps2, changes)
+            self.notes.driven(moment.now_s, moment.users, ahead, driven, known)

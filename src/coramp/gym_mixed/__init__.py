@@ -1,0 +1,1 @@
+"""MixedMerge-v0: automated vehicles among SUMO's drivers as agents."""

@@ -1,0 +1,63 @@
+"""The example of the page on training among drivers: that it trains, and that its table is true."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "docs" / "experiments" / "mixed-merge-v0"
+PAGE = FOLDER.parents[1] / "how-to" / "train-among-drivers.md"
+
+
+@pytest.fixture(scope="module")
+def learn():
+    spec = importlib.util.spec_from_file_location("learn_among_drivers", FOLDER / "learn.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    sys.modules.pop("learn_among_drivers", None)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return json.loads((FOLDER / "judged.json").read_text(encoding="utf-8"))
+
+
+def test_the_page_has_the_table(found, learn):
+    assert learn.table(found) in PAGE.read_text(encoding="utf-8")
+    assert list(found) == list(learn.policies())
+
+
+def test_the_table_is_what_policies_drive_now(found, learn):
+    names = ["trained, seed 1", "mixed-slots"]
+    seed = learn.JUDGED[0]
+    now = learn.judged(names, [seed])
+    assert now == {name: found[name][:1] for name in names}
+
+
+def test_trained_policies_lose_less_than_constant_and_random_actions(found, learn):
+    delay_s = {name: np.array([row["delay_s"] for row in rows]) for name, rows in found.items()}
+    trained = [values for name, values in delay_s.items() if name.startswith("trained")]
+    for name in ("random actions", "as fast as it may, merges", "keeps its speed, merges"):
+        assert all(values.mean() < delay_s[name].mean() for values in trained)
+
+
+def test_seeds_are_apart(learn):
+    assert not set(learn.JUDGED) & set(learn.VALIDATED)
+    assert max(*learn.JUDGED, *learn.VALIDATED) < learn.TRAINED_FROM
+
+
+def test_a_policy_is_trained(learn, monkeypatch):
+    monkeypatch.setattr(learn, "POPULATION", 3)
+    monkeypatch.setattr(learn, "ELITE", 1)
+    monkeypatch.setattr(learn, "EPISODES", 1)
+    monkeypatch.setattr(learn, "SETTINGS", {**learn.SETTINGS, "horizon_s": 40.0})
+    weights, curve = learn.train(1, generations=2, validated=[2000])
+    assert [row[0] for row in curve] == [0, 3]
+    assert len(weights) == len(learn.SPREAD)
+    action = learn.linear(weights)(np.zeros((4, 26), np.float32))
+    assert action.shape == (4, 2)
+    assert (np.abs(action) <= 1.0).all()
