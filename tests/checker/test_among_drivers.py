@@ -21,7 +21,14 @@ from coramp.checker.among_drivers import (
 )
 
 STEP_S = 0.1
-LIMITS = Limits(braking_mps2=6.0, driver_gap_m=2.5, driver_gap_s=1.0, relax_m=1.5)
+LIMITS = Limits(
+    braking_mps2=6.0,
+    driver_gap_m=2.5,
+    driver_gap_s=1.0,
+    relax_m=1.5,
+    relax_at_end_m=0.0,
+    lane_end_m=200.0,
+)
 AUTOMATED, DRIVER = True, False
 FRONT_M = 100.0
 

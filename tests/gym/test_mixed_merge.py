@@ -243,7 +243,7 @@ def users_of(station_m, on_mainline):
     return RoadUsers(
         np.arange(10, 10 + count),
         np.array(station_m, np.float64),
-        *(20.0 * ones, 5.0 * ones, np.array(on_mainline), np.ones(count, np.bool_)),
+        *(20.0 * ones, 0.0 * ones, 5.0 * ones, np.array(on_mainline), np.ones(count, np.bool_)),
         *(20.0 * ones, 2.0 * ones, np.inf * ones, 6.0 * ones),
     )
 

@@ -68,6 +68,7 @@ def users_of(rows):
         np.arange(count, dtype=np.int64) + 100,
         np.array([row[0] for row in full], np.float64),
         np.array([row[1] for row in full], np.float64),
+        np.zeros(count),
         np.array([row[4] for row in full], np.float64),
         np.array([row[2] for row in full], np.bool_),
         np.array([row[3] for row in full], np.bool_),

@@ -46,13 +46,17 @@ class Seen(NamedTuple):
 class Limits(NamedTuple):
     """The leader's braking b (m/s2) that is reckoned with, and what a driver behind keeps.
 
-    ``relax_m`` is by how much a lane change may fall short of that.
+    ``relax_m`` is by how much a lane change may fall short of that, ``relax_at_end_m`` by how much
+    more where the acceleration lane ends, at ``lane_end_m``; before that it grows with the square
+    of the station.
     """
 
     braking_mps2: float
     driver_gap_m: float
     driver_gap_s: float
     relax_m: float
+    relax_at_end_m: float
+    lane_end_m: float
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,9 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     He has driven on for a step, and he may have sped up in it.
     """
     own, rear = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
-    needs_m = limits.driver_gap_m + limits.driver_gap_s * rear - limits.relax_m
+    share = np.maximum(0.0, seen.station_m[pairs.front] / limits.lane_end_m)
+    needs_m = limits.driver_gap_m + limits.driver_gap_s * rear
+    needs_m -= limits.relax_m + limits.relax_at_end_m * share**2
     needs_m += (rear**2 - own**2) / (2.0 * COMFORT_MPS2)
     automated = seen.automated[seen.vehicle]
     found = came_in[pairs.front] & automated[pairs.front] & ~automated[pairs.rear]

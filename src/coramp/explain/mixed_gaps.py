@@ -32,9 +32,8 @@ class Drove:
         """The laws of automated vehicles."""
         scenario, told = self.run.scenario, self.run.on_board
         drivers = scenario.drivers[self.run.content["drivers"]]
-        return laws_of(
-            scenario, drivers, scenario.control.step_s if told is None else period_s(told)
-        )
+        period = scenario.control.step_s if told is None else period_s(told)
+        return laws_of(scenario, drivers, period, self.delay_s)
 
     @cached_property
     def delay_s(self) -> float:
@@ -97,6 +96,7 @@ class Drove:
             numbers,
             np.array([station_m, other_m]),
             np.array([row["speed_mps"], other_mps]),
+            np.array([row["measured_mps2"], row[f"{side}_accel_mps2"]]),
             able.length_m[numbers],
             np.array([False, True]),
             able.automated[numbers],

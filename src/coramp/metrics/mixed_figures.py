@@ -95,7 +95,14 @@ def _conflicts(outcome: Outcome, scenario: Scenario) -> Row:
 def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:
     """Returns what automated vehicles reckon with on this road, among these drivers."""
     law = SafetyLaw().on(scenario.road.assumed_braking_mps2)
-    return Limits(law.braking_mps2, drivers.min_gap_m, max(drivers.taus_s), law.relax_m)
+    return Limits(
+        law.braking_mps2,
+        drivers.min_gap_m,
+        max(drivers.taus_s),
+        law.relax_m,
+        law.relax_at_end_m,
+        law.lane_end_m,
+    )
 
 
 def safety_events(outcome: Outcome, scenario: Scenario) -> pl.DataFrame:

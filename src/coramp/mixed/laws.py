@@ -6,9 +6,10 @@ from coramp.mixed.users import Gaps, MixedRoad
 
 
 class FollowingLaw(NamedTuple):
-    """How an automated vehicle follows: a = k_g (gap - s_0 - T v) + k_v (v_leader - v).
+    """How an automated vehicle follows: a = k_g (gap - s_0 - T v) + k_v (v_l - v) + k_a a_l.
 
-    ``gap_gain_ps2`` is k_g and ``speed_gain_ps`` k_v for the vehicle ahead in its lane;
+    v_l and a_l are the leader's speed and acceleration. ``gap_gain_ps2`` is k_g, ``speed_gain_ps``
+    k_v and ``feed_forward`` k_a for the vehicle ahead in its lane;
     ``courtesy_gap_gain_ps2`` and ``courtesy_speed_gain_ps`` are those for one that is yet to merge,
     or behind which it is itself to merge. For these it brakes by at most ``courtesy_mps2``, and by
     ``early_share`` of that while the merge is more than ``early_s`` away. ``speed_up_mps2`` is its
@@ -16,7 +17,8 @@ class FollowingLaw(NamedTuple):
     """
 
     gap_gain_ps2: float = 0.22
-    speed_gain_ps: float = 1.0
+    speed_gain_ps: float = 0.85
+    feed_forward: float = 0.6
     courtesy_gap_gain_ps2: float = 0.2
     courtesy_speed_gain_ps: float = 1.0
     courtesy_mps2: float = 2.5
@@ -56,8 +58,9 @@ class SafetyLaw(NamedTuple):
     It stays behind a leader that brakes at ``braking_mps2`` if it reacts after ``reaction_s`` and
     brakes at that rate too, with ``margin_m`` to spare; ``hardest_mps2`` is what its brakes can do.
     It can stop with ``stop_mps2`` before ``lane_end_m``. A lane change leaves a driver behind
-    s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``; one who is slower is
-    judged by ``driver_dry_mps2`` on any road. It asks nobody automated for more than
+    s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``, and less
+    ``relax_at_end_m`` more where the lane ends; one who is slower is judged by ``driver_dry_mps2``
+    on any road. It asks nobody automated for more than
     ``gentle_mps2``, at the lane's end ``gentle_at_end_mps2`` more.
     """
 
@@ -70,6 +73,7 @@ class SafetyLaw(NamedTuple):
     driver_mps2: float = 4.5
     driver_dry_mps2: float = 4.5
     relax_m: float = 0.96
+    relax_at_end_m: float = 4.0
     gentle_mps2: float = 0.68
     gentle_at_end_mps2: float = 5.0
 

@@ -21,8 +21,8 @@ from coramp.mixed.users import NOBODY, RoadUsers, gap_m, in_order
 TO_CRUISE_S = 1.0
 CRUISE_BRAKING_MPS2 = 2.0
 """A vehicle goes to the speed that it wishes within a second, and slows for that no harder."""
-TOUCHING_M = 1.5
-"""Nobody changes lanes with less than this before or behind it."""
+STANDING_M, STANDING_S = 0.5, 0.1
+"""Nobody changes lanes with less than this, s_0 + T v of who is behind, before or behind it."""
 READY_M = 1.0
 """The first metres of the acceleration lane are no place to change."""
 REAR_BRAKES_SHARE = 3.0
@@ -128,11 +128,11 @@ def _may_be_behind(
     safety = laws.safety
     free_m = users.station_m[front] - users.length_m[front] - users.station_m[rear]
     keeps_mps = _keeps_mps(users, rear, front, ahead, safety)
-    spare_mps = keeps_mps - ahead.speed_mps[rear]
+    spare_mps, touching_m = keeps_mps - ahead.speed_mps[rear], _touching_m(users, rear)
     brakes_mps2 = 0.0 if rear == changes else safety.braking_mps2 / REAR_BRAKES_SHARE
-    if free_m < TOUCHING_M or spare_mps < -brakes_mps2 * safety.reaction_s:
+    if free_m < touching_m or spare_mps < -brakes_mps2 * safety.reaction_s:
         return False
-    if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < TOUCHING_M:
+    if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < touching_m:
         return False  # it would only come to a stand beyond
     share = max(0.0, users.station_m[changes] / safety.lane_end_m)
     gentle_mps2 = safety.gentle_mps2 + safety.gentle_at_end_mps2 * share * share
@@ -147,9 +147,17 @@ def _leaves_driver_room(
     safety, rear_mps = laws.safety, users.speed_mps[rear]
     squares = rear_mps**2 - slowest_mps**2
     braking_m = max(squares / (2.0 * safety.driver_mps2), squares / (2.0 * safety.driver_dry_mps2))
-    needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - safety.relax_m
+    share = max(0.0, users.station_m[own] / safety.lane_end_m)
+    relax_m = safety.relax_m + safety.relax_at_end_m * share * share
+    needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - relax_m
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
-    return bool(free_m >= max(TOUCHING_M, needs_m))
+    return bool(free_m >= max(_touching_m(users, rear), needs_m))
+
+
+@kernel
+def _touching_m(users: RoadUsers, rear: int) -> float:
+    """The distance (m) that is too small whatever the speeds ahead."""
+    return float(STANDING_M + STANDING_S * users.speed_mps[rear])
 
 
 @kernel
@@ -172,14 +180,17 @@ def _keeps_mps(users: RoadUsers, own: int, front: int, ahead: Ahead, law: Safety
 def _follows_mps2(users: RoadUsers, own: int, front: int, ahead: Ahead, laws: OnBoardLaws) -> float:
     """The linear law behind a vehicle in the same lane, or one that is about to be in it.
 
-    It holds for when a command acts; the leader is taken to keep its speed until then.
+    It holds for when a command acts; a share of the leader's acceleration is taken over, and the
+    leader is taken to go on with that until then.
     """
     speed_mps, front_mps = ahead.speed_mps[own], users.speed_mps[front]
+    law, delay_s = laws.following, ahead.delay_s
+    front_mps2 = law.feed_forward * users.accel_mps2[front]
     free_m = users.station_m[front] - users.length_m[front] - users.station_m[own]
-    free_m += front_mps * ahead.delay_s - ahead.way_m[own]
+    free_m += (front_mps + 0.5 * front_mps2 * delay_s) * delay_s - ahead.way_m[own]
     error_m = free_m - gap_m(True, users.automated[front], speed_mps, laws.gaps)
-    law = laws.following
-    return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * (front_mps - speed_mps))
+    faster_mps = max(0.0, front_mps + front_mps2 * delay_s) - speed_mps
+    return float(law.gap_gain_ps2 * error_m + law.speed_gain_ps * faster_mps + front_mps2)
 
 
 @kernel

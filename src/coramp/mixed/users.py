@@ -7,13 +7,16 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 
 NOBODY = -1
+ACCEL_LASTS_S = 0.5
+"""A vehicle is taken to go on accelerating as it does for so long, then to keep its speed."""
 
 
 class RoadUsers(NamedTuple):
     """All vehicles on the road, one entry each, in any order.
 
     ``number`` is the vehicle's own for the whole run. ``station_m`` is that of its front bumper,
-    negative before the nose. ``on_mainline`` is False on the ramp and the acceleration lane.
+    negative before the nose. ``accel_mps2`` is what it accelerates with now, smoothed.
+    ``on_mainline`` is False on the ramp and the acceleration lane.
     ``cruise_mps`` is v0, or its own top speed below that. min(a_0, P / (m v)), of
     ``acceleration_mps2`` and ``power_wpkg``, bounds how it speeds up. ``braking_mps2`` is what it
     relies on of its own brakes.
@@ -22,6 +25,7 @@ class RoadUsers(NamedTuple):
     number: IntArray
     station_m: FloatArray
     speed_mps: FloatArray
+    accel_mps2: FloatArray
     length_m: FloatArray
     on_mainline: BoolArray
     automated: BoolArray
@@ -87,3 +91,24 @@ def in_order(station_m: FloatArray, chosen: BoolArray) -> IntArray:
             order[k] = i
             count += 1
     return order[:count]
+
+
+def onwards(
+    speed_mps: FloatArray, accel_mps2: FloatArray, time_s: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Returns how far vehicles go in a time (m), and their speeds (m/s) then.
+
+    They accelerate as they do for up to ``ACCEL_LASTS_S``, and keep their speed after that.
+    """
+    accel_s = np.minimum(time_s, ACCEL_LASTS_S)
+    then_mps = np.maximum(0.0, speed_mps + accel_mps2 * accel_s)
+    way_m = 0.5 * (speed_mps + then_mps) * accel_s + then_mps * (time_s - accel_s)
+    return np.asarray(way_m), np.asarray(then_mps)
+
+
+def soon(users: RoadUsers, time_s: float) -> RoadUsers:
+    """Returns the users as they are taken to be in a time."""
+    if time_s == 0.0:
+        return users
+    way_m, then_mps = onwards(users.speed_mps, users.accel_mps2, time_s)
+    return users._replace(station_m=users.station_m + way_m, speed_mps=then_mps)

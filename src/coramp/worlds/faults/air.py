@@ -13,16 +13,18 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.demand.arrivals import generator
 from coramp.mixed.situation import Steering
-from coramp.mixed.users import RoadUsers
+from coramp.mixed.users import RoadUsers, onwards
 from coramp.scenarios.model import Scenario
 from coramp.worlds.faults.link import ROUNDING_S, LossyLink
 from coramp.worlds.faults.positions import WrongClocks, WrongPositions
 
-NUMBER, STAMP, STATION, SPEED, ON_MAINLINE = range(5)
+NUMBER, STAMP, STATION, SPEED, ON_MAINLINE, ACCEL = range(6)
 """Columns of a report."""
 GIVEN, MOST, MERGE = 1, 2, 3
 """Columns of a command, after the number of its vehicle."""
 BEYOND_M = 20.0
+MAKES_ROOM_MPS2, HOLDS_S = 0.5, 2.0
+"""So long after its command has expired a vehicle that was to speed up by less keeps its room."""
 
 
 @dataclass
@@ -54,7 +56,7 @@ class Air:
         positioning = self._random_of("positioning")
         self._positions = WrongPositions(scenario.positioning, count, positioning)
         self._clocks = WrongClocks(scenario.clock, count, self._random_of("clock"))
-        self._known, self._command = np.full((count, 5), np.nan), np.full((count, 4), np.nan)
+        self._known, self._command = np.full((count, 6), np.nan), np.full((count, 4), np.nan)
         self._reported_s, self._overdue = np.full(count, -np.inf), np.zeros(count, np.bool_)
         self._draw_characters(count)
 
@@ -95,12 +97,6 @@ class Air:
                 self._known[number] = row
         return self._carried_on(now_s, users)
 
-    def age_s(self, now_s: float, number: IntArray) -> FloatArray:
-        """Returns how old what is known of vehicles is, by its stamps: 0 if all is perfect."""
-        if self.is_perfect:
-            return np.zeros(len(number))
-        return np.asarray(np.maximum(0.0, now_s - self._known[number, STAMP]))
-
     def _report(self, now_s: float, users: RoadUsers) -> None:
         """Sends reports of those whose time has come, with the errors of the moment."""
         period_s = self.scenario.reports.period_s or 0.0
@@ -117,15 +113,17 @@ class Air:
                 users.station_m[due] + error_m,
                 np.maximum(0.0, users.speed_mps[due] + self._positions.speed_error_mps(own)),
                 users.on_mainline[due].astype(np.float64),
+                users.accel_mps2[due],
             ]
         )
         self._reports.send(now_s, rows)
 
     def _carried_on(self, now_s: float, users: RoadUsers) -> RoadUsers:
-        """The last reports, carried on at their speeds; those that are stale are forgotten."""
+        """The last reports, carried on from their stamps; those that are stale are forgotten."""
         known, end_m = self._known, self.scenario.mainline.end_m
         age_s = np.clip(now_s - known[:, STAMP], 0.0, None)
-        station_m = known[:, STATION] + known[:, SPEED] * age_s
+        way_m, speed_mps = onwards(known[:, SPEED], known[:, ACCEL], age_s)
+        station_m = known[:, STATION] + way_m
         fresh = (age_s <= self.scenario.reports.stale_s) & (station_m < end_m + BEYOND_M)
         number = np.flatnonzero(fresh)
         place = self._place_of(users)
@@ -134,7 +132,8 @@ class Air:
         return users._replace(
             number=number,
             station_m=station_m[number],
-            speed_mps=known[number, SPEED].copy(),
+            speed_mps=speed_mps[number],
+            accel_mps2=known[number, ACCEL],
             length_m=users.length_m[there],
             on_mainline=known[number, ON_MAINLINE] > 0.5,
             automated=users.automated[there],
@@ -167,7 +166,8 @@ class Air:
 
         What is older than what a vehicle has changes nothing, and one that is silent hears nothing.
         A vehicle whose last command is overdue goes by itself: it keeps its distances, and merges
-        where it sees that all distances are kept. Who waited for leave would hold up the ramp.
+        where it sees that all distances are kept. Who waited for leave would hold up the ramp. One
+        that was to make room on the mainline does not speed up for another ``HOLDS_S``.
         """
         for row in self._commands.received(now_s):
             number = int(row[NUMBER])
@@ -177,10 +177,13 @@ class Air:
             ):
                 self._command[number] = row
         command = self._command[users.number]
-        valid = command[:, GIVEN] >= now_s - self.scenario.commands.valid_s - ROUNDING_S
+        expired_s = now_s - command[:, GIVEN] - self.scenario.commands.valid_s
+        valid = expired_s <= ROUNDING_S
         self._count_fallbacks(users, valid, command)
         obeys = valid & ~self._disobeys[users.number] & users.automated
-        most_mps2 = np.where(obeys, command[:, MOST], np.inf)
+        holds = users.on_mainline & (expired_s <= HOLDS_S) & (command[:, MOST] < MAKES_ROOM_MPS2)
+        holds &= ~valid & users.automated & ~self._disobeys[users.number]
+        most_mps2 = np.where(obeys, command[:, MOST], np.where(holds, 0.0, np.inf))
         alone = users.automated & ~obeys
         return most_mps2, alone | obeys & (command[:, MERGE] > 0.5)
 
@@ -191,7 +194,12 @@ class Air:
         self._overdue[users.number] = overdue
 
     def age_s(self, now_s: float, number: IntArray) -> FloatArray:
-        """Returns how old by its stamp (s) the last report of each vehicle is, nan without one."""
+        """Returns how old by its stamp (s) the last report of each vehicle is, nan without one.
+
+        It is 0 where all is perfect.
+        """
+        if self.is_perfect:
+            return np.zeros(len(number))
         return np.asarray(np.maximum(now_s - self._known[number, STAMP], 0.0))
 
     def given_s(self, number: IntArray) -> FloatArray:

@@ -15,7 +15,7 @@ from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.laws import OnBoardLaws
 from coramp.mixed.on_board import Ahead, driven_mps2, may_change_lane, neighbours_of
 from coramp.mixed.situation import MixedSituation, MixedStrategy, Places, Steering
-from coramp.mixed.users import RoadUsers
+from coramp.mixed.users import RoadUsers, soon
 from coramp.records.outcome import Outcome
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import steps_of_period
@@ -86,9 +86,10 @@ def begun(
             actuators,
         )
         heard = automated | connected_of(scenario, arrivals, seed)
-        laws = laws_of(scenario, drivers, plant.period_s)
+        laws = laws_of(scenario, drivers, plant.period_s, actuators.delay_s)
         air = Air(scenario, heard, automated, seed)
-        control = Control(strategy, laws, air, notes=notes_of(options, air))
+        acts_after_s = scenario.commands.delay_s + actuators.delay_s
+        control = Control(strategy, laws, air, acts_after_s, notes=notes_of(options, air))
         careless = Careless(scenario, session, seed)
         yield MixedRun(scenario, population, arrivals, files, plant, control, careless)
 
@@ -183,24 +184,30 @@ class MixedRun:
 class Control:
     """The strategy for all, what reaches it and whom, and what each vehicle does on board.
 
-    ``notes`` is where that is noted, if anywhere.
+    A command acts ``acts_after_s`` on average after it was given: its way, and slow actuators.
+    ``notes`` is where all is noted, if anywhere.
     """
 
     strategy: MixedStrategy
     laws: OnBoardLaws
     air: Air
+    acts_after_s: float = 0.0
     places: Places = field(default=())
     notes: Notes | None = None
 
     def decided(self, now_s: float, names: list[str], able: BoolArray, users: RoadUsers) -> Moment:
-        """Returns what the strategy answers to what it has heard."""
+        """Returns what the strategy answers to what it has heard.
+
+        It is shown where vehicles will be when its commands act.
+        """
         if not users.automated.any():
             return Moment(now_s, names, able, users, users, None)
         laws, seen = self.laws, self.air.heard(now_s, users)
         if len(seen.number) == 0:
             return Moment(now_s, names, able, users, seen, None)
-        around = neighbours_of(seen)
-        situation = MixedSituation(now_s, laws.period_s, seen, around, laws.gaps, laws.road)
+        then = soon(seen, self.acts_after_s)
+        around = neighbours_of(then)
+        situation = MixedSituation(now_s, laws.period_s, then, around, laws.gaps, laws.road)
         steering = self.strategy.steer(situation, self.places)
         self.places = steering.places
         return Moment(now_s, names, able, users, seen, steering)

@@ -18,11 +18,12 @@ from coramp.worlds.faults.heard import HeardRecord
 from coramp.worlds.sumo.files import SumoOptions
 
 COLUMNS = (
-    *("time_s", "vehicle", "station_m", "speed_mps", "on_mainline", "law", "accel_mps2"),
+    *("time_s", "vehicle", "station_m", "speed_mps", "measured_mps2", "on_mainline", "law"),
+    "accel_mps2",
     *("told_mps2", "given_s", "fallback", "place", "after", "changes", "ahead_m", "ahead_mps"),
-    *("leader", "leader_gap_m", "leader_speed_mps"),
-    *("front", "front_gap_m", "front_speed_mps"),
-    *("rear", "rear_gap_m", "rear_speed_mps"),
+    *("leader", "leader_gap_m", "leader_speed_mps", "leader_accel_mps2"),
+    *("front", "front_gap_m", "front_speed_mps", "front_accel_mps2"),
+    *("rear", "rear_gap_m", "rear_speed_mps", "rear_accel_mps2"),
 )
 
 
@@ -55,6 +56,7 @@ class OnBoardRecord:
                 number,
                 users.station_m,
                 users.speed_mps,
+                users.accel_mps2,
                 users.on_mainline,
                 law,
                 np.where(users.automated, accel_mps2, np.nan),
@@ -94,17 +96,13 @@ def order_of(seen: RoadUsers, places: Places, vehicles: int) -> tuple[IntArray, 
     return place, after
 
 
-def _neighbour(
-    users: RoadUsers, other: IntArray, there: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Number, distance (m) and speed (m/s) of the vehicle in front of each, nan for none."""
+def _neighbour(users: RoadUsers, other: IntArray, there: BoolArray) -> tuple[FloatArray, ...]:
+    """Number, distance, speed and acceleration (SI) of who is in front of each, nan for none."""
     gap_m = users.station_m[other] - users.length_m[other] - users.station_m
     return _where(there, users, other, gap_m)
 
 
-def _follower(
-    users: RoadUsers, other: IntArray, there: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _follower(users: RoadUsers, other: IntArray, there: BoolArray) -> tuple[FloatArray, ...]:
     """The same of the vehicle behind each."""
     gap_m = users.station_m - users.length_m - users.station_m[other]
     return _where(there, users, other, gap_m)
@@ -112,11 +110,12 @@ def _follower(
 
 def _where(
     there: BoolArray, users: RoadUsers, other: IntArray, gap_m: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, ...]:
     return (
         np.where(there, users.number[other], NOBODY).astype(np.float64),
         np.where(there, gap_m, np.nan),
         np.where(there, users.speed_mps[other], np.nan),
+        np.where(there, users.accel_mps2[other], np.nan),
     )
 
 

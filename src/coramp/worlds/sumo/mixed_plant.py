@@ -16,6 +16,8 @@ from coramp.worlds.sumo.session import Session
 MERGE_LANE = "merge_0"
 NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
+SMOOTHED_OVER_S = 0.5
+"""Drivers' accelerations are noisy, and measured through a filter of this time constant."""
 
 
 @dataclass
@@ -37,6 +39,8 @@ class MixedPlant:
     largest_error_m: FloatArray = field(init=False)
     _sent_mps: FloatArray = field(init=False)
     _sent_m: FloatArray = field(init=False)
+    _was_mps: FloatArray = field(init=False)
+    _accel_mps2: FloatArray = field(init=False)
     _changing: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -44,6 +48,7 @@ class MixedPlant:
         count = len(self.able.automated)
         self._sent_mps, self._sent_m = np.full(count, np.nan), np.full(count, np.nan)
         self.largest_error_m = np.where(self.able.automated, 0.0, np.nan)
+        self._was_mps, self._accel_mps2 = np.full(count, np.nan), np.zeros(count)
 
     @property
     def period_s(self) -> float:
@@ -61,6 +66,7 @@ class MixedPlant:
             number,
             station_m,
             speed_mps,
+            self._measured_mps2(number, speed_mps),
             self.able.length_m[number],
             np.array([lane not in RAMP_LANES for lane in lanes], np.bool_),
             self.able.automated[number],
@@ -81,6 +87,15 @@ class MixedPlant:
         there = number[sent]
         self.largest_error_m[there] = np.maximum(self.largest_error_m[there], error_m)
         return np.where(sent, sent_mps, speed_mps)
+
+    def _measured_mps2(self, number: IntArray, speed_mps: FloatArray) -> FloatArray:
+        """Smoothed accelerations (m/s2) since the last command, 0 of who is new."""
+        was_mps = self._was_mps[number]
+        since_mps = np.where(np.isnan(was_mps), 0.0, speed_mps - was_mps)
+        share = min(1.0, self.period_s / SMOOTHED_OVER_S)
+        self._accel_mps2[number] += share * (since_mps / self.period_s - self._accel_mps2[number])
+        self._was_mps[number] = speed_mps
+        return np.asarray(self._accel_mps2[number])
 
     def ahead(self, users: RoadUsers) -> Ahead:
         """Returns where vehicles will be when a new command begins to act."""

@@ -17,9 +17,9 @@ from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
 
 LANE_END_M = 3.0
 """An automated vehicle that has not merged stands so far before the acceleration lane ends."""
-MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.22
+MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.15
 """How much more than behind an automated vehicle one keeps behind a driver."""
-MORE_FOR_DRIVER_S = 0.34
+MORE_FOR_DRIVER_S = 0.25
 """How much more than a driver's own gap room for one who merges has."""
 TRUCK_BRAKING_MPS2 = 5.0
 """What the brakes of a heavy vehicle must do (UN Regulation 13, type 0 test)."""
@@ -27,9 +27,22 @@ YIELDED_TO = 'lcCooperative="1"'
 """SUMO's drivers yield to it as to one another."""
 
 
-def gaps_of(scenario: Scenario, drivers: DriverPopulation) -> Gaps:
-    """Returns which gaps vehicles keep: automated ones those of ``[safety]``."""
-    own_m, own_s = scenario.safety.standstill_gap_m, scenario.safety.time_gap_s
+def kept_gap(scenario: Scenario, law: SafetyLaw, delay_s: float) -> tuple[float, float]:
+    """Returns the s_0 (m) and T (s) that automated vehicles keep behind one another.
+
+    Those of ``[safety]``, and at one speed no less than the law on board lets them come near: its
+    margin, and what is driven in its reaction time and in ``delay_s``, until a command acts.
+    """
+    safety = scenario.safety
+    return (
+        max(safety.standstill_gap_m, law.margin_m),
+        max(safety.time_gap_s, law.reaction_s + delay_s),
+    )
+
+
+def gaps_of(kept: tuple[float, float], drivers: DriverPopulation) -> Gaps:
+    """Returns which gaps vehicles keep, with what automated ones keep behind one another."""
+    own_m, own_s = kept
     theirs_m, theirs_s = drivers.min_gap_m, max(drivers.taus_s)
     return Gaps(
         behind_automated_m=own_m,
@@ -59,12 +72,18 @@ def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     )
 
 
-def laws_of(scenario: Scenario, drivers: DriverPopulation, period_s: float) -> OnBoardLaws:
-    """Returns all that automated vehicles drive by, commanded once each period among drivers."""
+def laws_of(
+    scenario: Scenario, drivers: DriverPopulation, period_s: float, delay_s: float
+) -> OnBoardLaws:
+    """Returns all that automated vehicles drive by among drivers.
+
+    They are commanded once each period; a command acts ``delay_s`` later.
+    """
+    law = safety_law_of(scenario, period_s)
     return OnBoardLaws(
-        gaps_of(scenario, drivers),
+        gaps_of(kept_gap(scenario, law, delay_s), drivers),
         FollowingLaw(),
-        safety_law_of(scenario, period_s),
+        law,
         MixedRoad(scenario.mainline.speed_mps, scenario.ramp.speed_mps, scenario.ramp.limit_mps),
         period_s,
     )
@@ -78,13 +97,8 @@ def automated_types(
     They are commanded once each ``period_s``; ``delay_s`` is the time until a command acts. SUMO
     lets a vehicle enter at such gaps, too.
     """
-    law = safety_law_of(scenario, period_s)
-    return Automated(
-        automated,
-        max(scenario.safety.time_gap_s, law.reaction_s + delay_s),
-        max(scenario.safety.standstill_gap_m, law.margin_m),
-        YIELDED_TO,
-    )
+    kept_m, kept_s = kept_gap(scenario, safety_law_of(scenario, period_s), delay_s)
+    return Automated(automated, kept_s, kept_m, YIELDED_TO)
 
 
 @dataclass(frozen=True)
