@@ -65,8 +65,8 @@ def seen_of(*ways):
     )
 
 
-def found(*ways, reported=()):
-    return findings_of(seen_of(*ways), LIMITS, reported)
+def found(*ways, reported=(), limits=LIMITS):
+    return findings_of(seen_of(*ways), limits, reported)
 
 
 def causes(findings):
@@ -211,11 +211,12 @@ def test_a_driver_promises_no_distance():
     assert found(Way(FRONT_M, 10.0, DRIVER), behind(5.0, 20.0, DRIVER)).unkept == ()
 
 
-def merging(gap_m, own_mps=14.0, rear_mps=20.0, own=AUTOMATED, rear=DRIVER, more=()):
+def merging(gap_m, own_mps=14.0, rear_mps=20.0, own=AUTOMATED, rear=DRIVER, more=(), **asked):
     """One that changes lanes in its second step; the other has ``gap_m`` to it then."""
     return found(
         Way(FRONT_M - own_mps * STEP_S, own_mps, own, [0.0, *more], in_lane_from=1),
         behind(gap_m + rear_mps * STEP_S, rear_mps, rear, accel_mps2=[0.0, *more]),
+        **asked,
     )
 
 
@@ -227,6 +228,13 @@ def test_who_pushes_in_before_a_driver_is_found():
     assert merging(42.68).unkept == ()
     ((time_s, rear, front),) = merging(42.65).unkept
     assert (time_s, rear, front) == (pytest.approx(0.1), 1, 0)
+
+
+def test_towards_the_lanes_end_he_is_left_less():
+    """At 100 of 200 m, a quarter of 4 m less."""
+    relaxed = LIMITS._replace(relax_at_end_m=4.0)
+    assert merging(41.68, limits=relaxed).unkept == ()
+    assert len(merging(41.65, limits=relaxed).unkept) == 1
 
 
 @pytest.mark.parametrize(("own", "rear"), [(DRIVER, DRIVER), (DRIVER, AUTOMATED)])

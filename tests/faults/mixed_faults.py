@@ -43,9 +43,37 @@ PROTOCOL = (
     _fault(
         "reports are taken for what is now",
         AIR,
-        "station_m = known[:, STATION] + known[:, SPEED] * age_s",
-        "station_m = known[:, STATION] + 0.0 * age_s",
+        "onwards(known[:, SPEED], known[:, ACCEL], age_s)",
+        "onwards(known[:, SPEED], known[:, ACCEL], 0.0 * age_s)",
         f"{OF_AIR}::test_a_report_is_carried_on_from_its_stamp",
+    ),
+    _fault(
+        "the acceleration that was reported is forgotten",
+        AIR,
+        "onwards(known[:, SPEED], known[:, ACCEL], age_s)",
+        "onwards(known[:, SPEED], 0.0 * known[:, ACCEL], age_s)",
+        f"{OF_AIR}::test_a_report_is_carried_on_with_the_acceleration_reported",
+    ),
+    _fault(
+        "the strategy is shown where vehicles are, not where its commands find them",
+        "worlds/sumo/mixed.py",
+        "then = soon(seen, self.acts_after_s)",
+        "then = soon(seen, 0.0)",
+        f"{OF_RUNS}::test_the_strategy_is_shown_where_vehicles_will_be_when_its_commands_act",
+    ),
+    _fault(
+        "who has no valid command gives up the room that it made",
+        AIR,
+        "np.where(holds, 0.0, np.inf)",
+        "np.where(holds, np.inf, np.inf)",
+        f"{OF_AIR}::test_who_was_to_make_room_keeps_it_for_a_while_after_its_command_has_expired",
+    ),
+    _fault(
+        "vehicles try to keep less than the law on board allows",
+        SETUP,
+        "max(safety.time_gap_s, law.reaction_s + delay_s),",
+        "safety.time_gap_s,",
+        f"{OF_SETUP}::test_the_gap_that_is_kept_is_one_that_the_law_on_board_allows",
     ),
     _fault(
         "a stamp of the future carries a report back",
@@ -71,8 +99,8 @@ PROTOCOL = (
     _fault(
         "commands never expire",
         AIR,
-        "valid = command[:, GIVEN] >= now_s - self.scenario.commands.valid_s - ROUNDING_S",
-        "valid = command[:, GIVEN] >= now_s - 1e9",
+        "valid = expired_s <= ROUNDING_S",
+        "valid = expired_s <= 1e9",
         f"{OF_AIR}::test_an_overdue_command_leads_to_a_fallback_that_is_counted_once",
     ),
     _fault(
@@ -208,8 +236,8 @@ PROMISES = (
     _fault(
         "a lane change leaves no room for a driver behind",
         ON_BOARD,
-        "return bool(free_m >= max(TOUCHING_M, needs_m))",
-        "return bool(free_m >= TOUCHING_M)",
+        "return bool(free_m >= max(_touching_m(users, rear), needs_m))",
+        "return bool(free_m >= _touching_m(users, rear))",
         f"{OF_BOARD}::test_a_driver_behind_need_not_brake_harder_than_in_comfort",
     ),
     _fault(
@@ -243,8 +271,8 @@ PROMISES = (
     _fault(
         "one merges ahead of a vehicle that stops only beyond it",
         ON_BOARD,
-        "if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < TOUCHING_M:",
-        "if keeps_mps == 0.0 and free_m < TOUCHING_M:",
+        "if keeps_mps == 0.0 and free_m - ahead.way_m[rear] < touching_m:",
+        "if keeps_mps == 0.0 and free_m < touching_m:",
         f"{OF_SLOW}::test_nobody_merges_ahead_of_one_that_could_only_stop_beyond",
     ),
     _fault(

@@ -20,6 +20,7 @@ GAPS = Gaps(
 FOLLOWING = FollowingLaw(
     gap_gain_ps2=0.5,
     speed_gain_ps=1.0,
+    feed_forward=0.5,
     courtesy_gap_gain_ps2=0.1,
     courtesy_speed_gain_ps=0.5,
     courtesy_mps2=2.0,
@@ -49,6 +50,7 @@ SAFETY = SafetyLaw(
     lane_end_m=197.0,
     driver_mps2=4.5,
     relax_m=1.5,
+    relax_at_end_m=0.0,
     gentle_mps2=0.6,
     gentle_at_end_mps2=5.0,
 )
@@ -60,15 +62,16 @@ COURTESY = CourtesyLaws(GAPS, SEQUENCE, FOLLOWING, ROAD, period_s=0.2)
 def users_of(rows):
     """Returns road users from rows of station (m), speed (m/s), on the mainline, automated.
 
-    A row may go on with a length (m) and the brakes (m/s2) that the vehicle relies on.
+    A row may go on with a length (m), the brakes (m/s2) that the vehicle relies on, and its
+    acceleration (m/s2).
     """
-    full = [(*row, *(5.0, 6.0)[len(row) - 4 :]) for row in rows]
+    full = [(*row, *(5.0, 6.0, 0.0)[len(row) - 4 :]) for row in rows]
     count = len(full)
     return RoadUsers(
         np.arange(count, dtype=np.int64) + 100,
         np.array([row[0] for row in full], np.float64),
         np.array([row[1] for row in full], np.float64),
-        np.zeros(count),
+        np.array([row[6] for row in full], np.float64),
         np.array([row[4] for row in full], np.float64),
         np.array([row[2] for row in full], np.bool_),
         np.array([row[3] for row in full], np.bool_),

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 
 from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
 from coramp.mixed.on_board import (
+    Ahead,
     distance_speed_mps,
     driven_mps2,
     may_change_lane,
     neighbours_of,
 )
+from coramp.mixed.users import onwards, soon
 from coramp.worlds.sumo.mixed_setup import LANE_END_M
 from tests.mathematics import close
 from tests.mixed.roads import GAPS, ON_BOARD, ROAD, SAFETY, at_once, users_of
@@ -176,12 +178,12 @@ def test_the_largest_speed_that_keeps_the_distance():
     assert distance_speed_mps(4.0, 0.0, 0.0, 6.0, SAFETY) == pytest.approx(5.16712, abs=1e-5)
 
 
-def may_change(users, slowest_mps=None):
+def may_change(users, slowest_mps=None, laws=ON_BOARD):
     """Whether the first vehicle may change lanes; it may slow down until it is there."""
     if slowest_mps is None:
         slowest_mps = users.speed_mps[0]
     around, ahead = neighbours_of(users), at_once(users)
-    return may_change_lane(users, 0, around, ahead, slowest_mps, ON_BOARD)
+    return may_change_lane(users, 0, around, ahead, slowest_mps, laws)
 
 
 def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
@@ -199,6 +201,108 @@ def test_a_driver_behind_need_not_brake_harder_than_in_comfort():
     # if it slows down to 13 m/s meanwhile, (400 - 169) / 9 = 25.667 m: 3 m more
     assert may(100.0 - 5.0 - 46.68, 13.0)
     assert not may(100.0 - 5.0 - 46.65, 13.0)
+
+
+def test_towards_the_lanes_end_a_driver_behind_is_left_less():
+    """By hand: at 98.5 of 197 m, a quarter of 4 m less than the 43.667 m of above; at 197 m, 4 m.
+
+    At the end both drive at 6 m/s: 2.5 + 6 - 1.5 - 4 = 3 m.
+    """
+    laws = ON_BOARD._replace(safety=SAFETY._replace(relax_at_end_m=4.0))
+
+    def may(own_m, own_mps, gap_m, rear_mps):
+        rear_m = own_m - 5.0 - gap_m
+        users = users_of([(own_m, own_mps, False, True), (rear_m, rear_mps, True, False)])
+        return may_change(users, laws=laws)
+
+    assert may(98.5, 14.0, 42.68, 20.0)
+    assert not may(98.5, 14.0, 42.65, 20.0)
+    assert may(197.0, 6.0, 3.01, 6.0)
+    assert not may(197.0, 6.0, 2.99, 6.0)
+
+
+def test_one_that_stands_merges_ahead_of_one_that_stands_for_it():
+    """By courtesy a vehicle may have come as near as its margin: both would wait for ever."""
+
+    def may(gap_m, rear_mps=0.0):
+        rear_m = 197.0 - 5.0 - gap_m
+        return may_change(users_of([(197.0, 0.0, False, True), (rear_m, rear_mps, True, True)]))
+
+    assert may(1.1)
+    assert not may(0.4)
+    assert not may(1.1, rear_mps=8.0)
+
+
+def test_a_share_of_the_leaders_acceleration_is_taken_over():
+    """By hand: 10 m behind at 20 m/s he keeps 2 + 0.5 * 20 = 12 m, 0.5 (10 - 12) = -1 m/s2.
+
+    Half of the leader's -2 m/s2 is one more. A command that acts after 0.4 s finds the leader
+    0.5 * 1 * 0.4^2 = 0.08 m further back and 0.4 m/s slower: 0.04 + 0.4 m/s2 less.
+    """
+
+    def driven(accel_mps2, delay_s=0.0):
+        rows = [(100.0, 20.0, True, True, 5.0, 6.0, accel_mps2), (85.0, 20.0, True, True)]
+        users = users_of(rows)
+        ahead = Ahead(np.full(2, 20.0 * delay_s), users.speed_mps, delay_s)
+        free, none = np.full(2, np.inf), np.zeros(2, np.bool_)
+        laws = ON_BOARD._replace(safety=SAFETY._replace(margin_m=-100.0))
+        return driven_mps2(users, neighbours_of(users), ahead, free, none, laws)[1]
+
+    assert driven(0.0) == pytest.approx(-1.0)
+    assert driven(-2.0) == pytest.approx(-2.0)
+    assert driven(-2.0, delay_s=0.4) == pytest.approx(-2.44)
+
+
+def test_a_string_of_vehicles_damps_every_wave():
+    """Driven in plain Python: twelve vehicles behind one that swings by 1 m/s, at 0.5 s.
+
+    2 k_v T + k_g T^2 >= 2 (1 - k_a); without k_a the waves would grow.
+    """
+
+    def grown(law, period_s):
+        swing, step_s = 2.0 * math.pi / period_s, 0.02
+        speeds, gaps = np.full(12, 20.0), np.full(12, 12.0)
+        swings = np.zeros(12)
+        for step in range(round(600.0 / step_s)):
+            time_s = step * step_s
+            lead_mps = 20.0 + math.sin(swing * time_s)
+            lead_mps2 = swing * math.cos(swing * time_s)
+            before, accels = np.append(lead_mps, speeds[:-1]), np.zeros(12)
+            accel = lead_mps2
+            for i in range(12):
+                error_m = gaps[i] - 2.0 - 0.5 * speeds[i]
+                accel = (
+                    law.gap_gain_ps2 * error_m
+                    + law.speed_gain_ps * (before[i] - speeds[i])
+                    + law.feed_forward * accel
+                )
+                accels[i] = accel
+            gaps += (before - speeds) * step_s
+            speeds += accels * step_s
+            if time_s > 300.0:
+                swings = np.maximum(swings, np.abs(speeds - 20.0))
+        return swings[-1]
+
+    law = FollowingLaw()
+    margin = (
+        2.0 * law.speed_gain_ps * 0.5 + law.gap_gain_ps2 * 0.25 - 2.0 * (1.0 - law.feed_forward)
+    )
+    assert margin > 0.0
+    for period_s in (10.0, 20.0, 60.0):
+        assert grown(law, period_s) <= 1.02
+    assert grown(law._replace(feed_forward=0.0), 20.0) > 1.2
+
+
+def test_vehicles_go_on_accelerating_for_half_a_second():
+    """By hand: from 10 m/s with 2 m/s2, 5.25 m in 0.5 s and 11 m/s from then on."""
+    way_m, speed_mps = onwards(np.array([10.0, 10.0, 0.5]), np.array([2.0, 2.0, -4.0]), 1.0)
+    assert way_m.tolist() == pytest.approx([10.75, 10.75, 0.125])
+    assert speed_mps.tolist() == pytest.approx([11.0, 11.0, 0.0])
+    way_m, _ = onwards(np.array([10.0]), np.array([2.0]), np.array([0.3]))
+    assert way_m.tolist() == pytest.approx([3.09])
+    users = users_of([(-50.0, 10.0, False, True, 5.0, 6.0, 2.0)])
+    assert soon(users, 1.0).station_m.tolist() == pytest.approx([-39.25])
+    assert soon(users, 0.0) is users
 
 
 def test_no_lane_change_too_near_to_the_vehicle_in_front_or_an_automated_one_behind():

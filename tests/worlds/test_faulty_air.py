@@ -91,7 +91,11 @@ def feed(air, rows):
         air._reports.send(0.0, np.array([row], np.float64))
 
 
-REPORTS = [(0, 0.0, -300.0, 20.0, 1), (0, 0.4, -290.0, 20.0, 1), (0, 0.8, -283.0, 20.0, 1)]
+REPORTS = [
+    (0, 0.0, -300.0, 20.0, 1, 0.0),
+    (0, 0.4, -290.0, 20.0, 1, 0.0),
+    (0, 0.8, -283.0, 20.0, 1, 0.0),
+]
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (0, 2, 1), (2, 2, 0, 2, 1, 1), (2,)])
@@ -145,7 +149,7 @@ def test_an_overdue_command_leads_to_a_fallback_that_is_counted_once():
     assert air.told(1.0, users)[0] == -1.0
     for now_s in (1.2, 1.4, 1.6):
         most_mps2, may_merge = air.told(now_s, users)
-        assert most_mps2 == np.inf
+        assert most_mps2 == 0.0
         assert may_merge.all()
         assert air.counts["fallbacks"] == 1
     air.tell(1.6, users, steering_of(users))
@@ -159,7 +163,30 @@ def test_a_command_counts_from_when_it_was_given_not_from_when_it_arrived():
     users = users_at([-300.0])
     air.tell(0.0, users, steering_of(users))
     assert air.told(1.0, users)[0] == -1.0
-    assert air.told(1.2, users)[0] == np.inf
+    assert air.told(1.2, users)[0] == 0.0
+
+
+def test_who_was_to_make_room_keeps_it_for_a_while_after_its_command_has_expired():
+    """On the mainline, 2 s; on the ramp, and where it was to speed up, not at all."""
+    air = air_of({"commands.valid_s": 1.0, "reports.loss": 0.1})
+    users = users_at([-300.0, -200.0, -100.0])
+    users = users._replace(on_mainline=np.array([True, True, False]))
+    orders = steering_of(users)._replace(most_mps2=np.array([-1.0, 1.5, -1.0]))
+    air.tell(0.0, users, orders)
+    assert air.told(1.0, users)[0].tolist() == [-1.0, 1.5, -1.0]
+    for now_s in (1.2, 3.0):
+        assert air.told(now_s, users)[0].tolist() == [0.0, np.inf, np.inf]
+    assert air.told(3.2, users)[0].tolist() == [np.inf, np.inf, np.inf]
+
+
+def test_a_report_is_carried_on_with_the_acceleration_reported():
+    """By hand: at 20 m/s with -2 m/s2 for 0.4 s, 7.84 m and 19.2 m/s."""
+    air = air_of({"reports.delay_s": 0.4})
+    users = users_at([-300.0])._replace(accel_mps2=np.array([-2.0]))
+    air.heard(0.0, users)
+    seen = air.heard(0.4, users)
+    assert seen.station_m.tolist() == pytest.approx([-300.0 + 7.84])
+    assert seen.speed_mps.tolist() == pytest.approx([19.2])
 
 
 def test_who_is_told_to_wait_may_not_merge():

@@ -4,10 +4,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from coramp.mixed.situation import MixedSituation
 from coramp.records.lapses import FALLBACK, UNKNOWN, lapses_in
 from coramp.runs.running import execute, make_spec, recorded
-from coramp.strategies.mixed_slots import MixedSlots
+from coramp.worlds.faults.air import Air
 from coramp.worlds.sumo.files import SumoOptions
 
 DEMAND = {"mainline_veh_h": 1500.0, "ramp_veh_h": 500.0, "seed": 5, "horizon_s": 60.0}
@@ -30,23 +29,23 @@ def specified(overrides):
 
 @pytest.fixture(scope="module")
 def failing():
-    """Returns a run in a world that fails, and where its strategy saw whom, by time and number."""
+    """Returns a run in a world that fails, and where it heard whom to be, by time and number."""
     seen = {}
-    own = MixedSlots.steer
+    own = Air.heard
 
-    def steer(self, situation: MixedSituation, places):
-        users = situation.users
-        for number, station_m in zip(users.number.tolist(), users.station_m, strict=True):
-            seen[round(situation.time_s, 3), number] = station_m
-        return own(self, situation, places)
+    def heard(self, now_s, users):
+        found = own(self, now_s, users)
+        for number, station_m in zip(found.number.tolist(), found.station_m, strict=True):
+            seen[round(now_s, 3), number] = station_m
+        return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(MixedSlots, "steer", steer)
+        patch.setattr(Air, "heard", heard)
         run = recorded(specified(FAILING), KEEP)
     return run, seen
 
 
-def test_what_was_heard_is_what_the_strategy_saw(failing):
+def test_what_was_heard_is_what_is_recorded(failing):
     run, seen = failing
     number = {name: k for k, name in enumerate(run.vehicles["vehicle_id"])}
     known = run.heard.drop_nulls("station_m")

@@ -17,6 +17,7 @@ from coramp.road.lanes import MAINLINE
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.mixed_slots import MixedSlots
+from coramp.worlds.faults.air import Air
 
 NAMES = {"run_id", "strategy", "overrides", "settings", "wall_s"}
 PLANNING = {"planning_median_s", "planning_p95_s"}
@@ -319,6 +320,33 @@ def test_connected_drivers_are_known_to_the_strategy(monkeypatch):
 def test_some_drivers_are_connected(monkeypatch):
     seen, automated, everyone = known_numbers(monkeypatch, 0.5)
     assert automated < seen < set(range(everyone))
+
+
+def test_the_strategy_is_shown_where_vehicles_will_be_when_its_commands_act(monkeypatch):
+    """Commands take 0.3 s, and a dead time of 0.2 s makes it half a second."""
+    heard, shown = [], []
+    hears, steers = Air.heard, MixedSlots.steer
+
+    def hear(self, now_s, users):
+        heard.append(hears(self, now_s, users))
+        return heard[-1]
+
+    def steer(self, situation: MixedSituation, places):
+        shown.append((len(heard) - 1, situation.users))
+        return steers(self, situation, places)
+
+    monkeypatch.setattr(Air, "heard", hear)
+    monkeypatch.setattr(MixedSlots, "steer", steer)
+    late = {"commands.delay_s": 0.3, "actuators.dead_time_s": 0.2}
+    driven(overrides={"traffic.automated_share": 0.5, **late}, horizon_s=60.0)
+    moved = 0
+    for place, users in shown:
+        was = heard[place]
+        then_mps = np.maximum(0.0, was.speed_mps + 0.5 * was.accel_mps2)
+        assert np.allclose(users.speed_mps, then_mps)
+        assert np.allclose(users.station_m - was.station_m, 0.25 * (was.speed_mps + then_mps))
+        moved += int((np.abs(was.accel_mps2) > 0.5).sum())
+    assert moved > 100
 
 
 def test_automated_vehicles_that_nobody_coordinates_are_told_nothing(told):

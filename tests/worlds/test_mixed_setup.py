@@ -6,7 +6,14 @@ import pytest
 from coramp.demand.arrivals import arrivals_of, automated_of
 from coramp.mixed.laws import SafetyLaw
 from coramp.scenarios.loading import load_scenario
-from coramp.worlds.sumo.mixed_setup import Able, actuators_of, automated_types, safety_law_of
+from coramp.worlds.sumo.mixed_setup import (
+    Able,
+    actuators_of,
+    automated_types,
+    kept_gap,
+    laws_of,
+    safety_law_of,
+)
 
 OURS = SafetyLaw()
 HALF = {"traffic.automated_share": 0.5, "simulation.horizon_s": 300.0}
@@ -37,6 +44,18 @@ def test_the_margin_holds_what_drivers_in_euler_steps_stop_shorter():
     slow = scenario_of()
     shorter_m = 0.5 * slow.mainline.limit_mps * 0.1
     assert safety_law_of(slow, 0.2).margin_m == max(OURS.margin_m, shorter_m)
+
+
+def test_the_gap_that_is_kept_is_one_that_the_law_on_board_allows():
+    """By hand: reaction 0.3 s and a delay of 0.4 s are more than the 0.5 s asked for."""
+    asked = {"safety.time_gap_s": 0.5, "safety.standstill_gap_m": 2.0}
+    scenario, law = scenario_of(asked), SafetyLaw(reaction_s=0.3, margin_m=1.2)
+    assert kept_gap(scenario, law, 0.0) == (2.0, 0.5)
+    assert kept_gap(scenario, law, 0.4) == pytest.approx((2.0, 0.7))
+    assert kept_gap(scenario_of(), law, 0.1) == pytest.approx((1.2, 0.4))
+    gaps = laws_of(scenario, scenario.drivers["fair"], 0.2, 0.4).gaps
+    assert gaps.behind_automated_s == pytest.approx(0.7)
+    assert gaps.behind_driver_s > gaps.behind_automated_s
 
 
 def test_the_lane_ends_where_it_does_but_for_3_m():
