@@ -32,17 +32,20 @@ def test_the_page_has_the_table(found, learn):
 
 
 def test_the_table_is_what_policies_drive_now(found, learn):
-    names = ["trained, seed 1", "mixed-slots"]
+    names = ["trained, seed 3", "mixed-slots"]
     seed = learn.JUDGED[0]
     now = learn.judged(names, [seed])
     assert now == {name: found[name][:1] for name in names}
 
 
-def test_trained_policies_lose_less_than_constant_and_random_actions(found, learn):
+def test_the_median_policy_loses_less_than_constant_and_random_actions(found, learn):
     delay_s = {name: np.array([row["delay_s"] for row in rows]) for name, rows in found.items()}
     trained = [values for name, values in delay_s.items() if name.startswith("trained")]
-    for name in ("random actions", "as fast as it may, merges", "keeps its speed, merges"):
-        assert all(values.mean() < delay_s[name].mean() for values in trained)
+    median = sorted(trained, key=np.mean)[1]
+    for name in ("random actions", "keeps its speed, merges"):
+        less_s, half_s = learn.interval(median - delay_s[name])
+        assert less_s + half_s < 0.0
+    assert median.mean() < delay_s["as fast as it may, merges"].mean()
 
 
 def test_seeds_are_apart(learn):
