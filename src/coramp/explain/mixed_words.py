@@ -48,7 +48,7 @@ def assumed(drove: Drove) -> list[str]:
         )
     if drove.run.heard is not None:
         lines.append(
-            f"Who reports goes on at the speed reported, for {scenario.reports.stale_s:g} s at "
+            f"Who reports goes on as reported, for {scenario.reports.stale_s:g} s at "
             f"most; a command counts for {scenario.commands.valid_s:g} s."
         )
     return lines
