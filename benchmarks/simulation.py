@@ -17,8 +17,8 @@ class Clock:
 
 
 @contextmanager
-def simulation_clock(monkeypatch):
-    """Times what happens between the start and the close of SUMO sessions."""
+def simulation_clock(monkeypatch, module=engine):
+    """Times what happens between the start and the close of a module's SUMO sessions."""
     clock = Clock()
 
     class Timed(Session):
@@ -31,7 +31,7 @@ def simulation_clock(monkeypatch):
             return super().__exit__(*reason)
 
     with monkeypatch.context() as patched:
-        patched.setattr(engine, "Session", Timed)
+        patched.setattr(module, "Session", Timed)
         yield clock
 
 

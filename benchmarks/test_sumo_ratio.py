@@ -14,12 +14,14 @@ from benchmarks.simulation import plain_sumo_s, simulation_clock
 from coramp.runs.running import execute, make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategy_named
+from coramp.worlds.sumo import mixed
 from coramp.worlds.sumo.engine import run_cooperative
 from coramp.worlds.sumo.files import SumoOptions
 
 ROUNDS = 9
 SUMO_AT_MOST = 1.15
 EXACT_AT_LEAST, EXACT_AIM = 15.0, 20.0
+MIXED_AT_MOST, MIXED_AIM = 3.0, 2.0
 SLOTS_AT_LEAST, SLOTS_AIM = 3.0, 8.0
 """Slots plans every vehicle, not those of the ramp alone; the aim is not reached yet."""
 
@@ -44,6 +46,36 @@ def test_cooperative_run_against_plain_sumo(benchmark, monkeypatch, tmp_path, st
         f"plain sumo {statistics.median(plain):.3f} s, ratio {ratio:.2f} (at most {SUMO_AT_MOST})"
     )
     assert ratio <= SUMO_AT_MOST
+
+
+@pytest.mark.parametrize("preset", [None, "hard"])
+def test_mixed_run_against_plain_sumo(benchmark, monkeypatch, tmp_path, preset):
+    overrides = {
+        "mainline.flow_veh_h": 1800.0,
+        "ramp.flow_veh_h": 500.0,
+        "traffic.automated_share": 0.5,
+        "safety.time_gap_s": 0.5,
+        "safety.standstill_gap_m": 2.0,
+        **({} if preset is None else {"world.preset": preset}),
+    }
+    scenario, chosen = load_scenario("paper", overrides), strategy_named("mixed-slots")()
+    mixed.run_mixed(scenario, chosen, "fair", 1, SumoOptions(keep_in=tmp_path / "kept"))
+    plain, ours = [], []
+
+    def one_round():
+        with simulation_clock(monkeypatch, mixed) as clock:
+            mixed.run_mixed(scenario, chosen, "fair", 1, SumoOptions())
+        ours.append(clock.seconds)
+        plain.append(plain_sumo_s(tmp_path / "kept"))
+
+    benchmark.pedantic(one_round, rounds=ROUNDS, iterations=1)
+    ratio = statistics.median(o / p for o, p in zip(ours, plain, strict=True))
+    print(
+        f"\nmixed-slots at 50 %, 1800 + 500 veh/h, 1800 s, world {preset or 'perfect'}: "
+        f"{statistics.median(ours):.3f} s, plain sumo {statistics.median(plain):.3f} s, ratio "
+        f"{ratio:.2f} (aim {MIXED_AIM}, at most {MIXED_AT_MOST})"
+    )
+    assert preset is not None or ratio <= MIXED_AT_MOST
 
 
 def test_exact_run_against_plain_sumo(benchmark, tmp_path):
