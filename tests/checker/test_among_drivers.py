@@ -230,6 +230,12 @@ def test_who_pushes_in_before_a_driver_is_found():
     assert (time_s, rear, front) == (pytest.approx(0.1), 1, 0)
 
 
+def test_a_driver_who_moves_is_left_his_standstill_gap_at_least():
+    """2.5 m, less 1 m that he has driven on, however much faster the vehicle ahead is."""
+    assert merging(1.52, own_mps=12.0, rear_mps=4.5).unkept == ()
+    assert len(merging(1.48, own_mps=12.0, rear_mps=4.5).unkept) == 1
+
+
 def test_towards_the_lanes_end_he_is_left_less():
     """At 100 of 200 m, a quarter of 4 m less."""
     relaxed = LIMITS._replace(relax_at_end_m=4.0)

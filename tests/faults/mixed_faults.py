@@ -236,8 +236,8 @@ PROMISES = (
     _fault(
         "a lane change leaves no room for a driver behind",
         ON_BOARD,
-        "return bool(free_m >= max(_touching_m(users, rear), needs_m))",
-        "return bool(free_m >= _touching_m(users, rear))",
+        "return bool(free_m >= max(near_m, needs_m))",
+        "return bool(free_m >= near_m)",
         f"{OF_BOARD}::test_a_driver_behind_need_not_brake_harder_than_in_comfort",
     ),
     _fault(

@@ -221,6 +221,19 @@ def test_towards_the_lanes_end_a_driver_behind_is_left_less():
     assert not may(197.0, 6.0, 2.99, 6.0)
 
 
+def test_a_driver_who_moves_is_left_his_standstill_gap_at_least():
+    """At 8 m/s before one at 4.5 m/s the rest asks for less than 2.5 m: 0 m and even below."""
+
+    def may(gap_m, rear_mps):
+        rear_m = 190.0 - 5.0 - gap_m
+        users = users_of([(190.0, 8.0, False, True), (rear_m, rear_mps, True, False)])
+        return may_change(users)
+
+    assert may(2.51, 4.5)
+    assert not may(2.49, 4.5)
+    assert may(0.6, 0.0)
+
+
 def test_one_that_stands_merges_ahead_of_one_that_stands_for_it():
     """By courtesy a vehicle may have come as near as its margin: both would wait for ever."""
 

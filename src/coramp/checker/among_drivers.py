@@ -27,6 +27,8 @@ EXACT_M = 0.5
 EXACT_MPS2 = 0.2
 REMEMBERED_S = 8.0
 """A broken assumption explains what happens to the pair up to so much later."""
+STANDING_M = 0.5
+"""What whoever merges leaves a driver who stands."""
 COMFORT_MPS2 = 4.5
 """The braking by which SUMO's drivers judge gaps."""
 
@@ -163,13 +165,15 @@ def _spare_m(seen: Seen, pairs: Pairs, limits: Limits) -> FloatArray:
 def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> BoolArray:
     """Where an automated vehicle has come in before a driver, nearer than he brakes for in comfort.
 
-    He has driven on for a step, and he may have sped up in it.
+    He has driven on for a step, and he may have sped up in it. While he moves he has s_0 at least.
     """
     own, rear = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
     share = np.maximum(0.0, seen.station_m[pairs.front] / limits.lane_end_m)
     needs_m = limits.driver_gap_m + limits.driver_gap_s * rear
     needs_m -= limits.relax_m + limits.relax_at_end_m * share**2
     needs_m += (rear**2 - own**2) / (2.0 * COMFORT_MPS2)
+    near_m = np.minimum(limits.driver_gap_m, STANDING_M + limits.driver_gap_s * rear)
+    needs_m = np.maximum(needs_m, near_m)
     automated = seen.automated[seen.vehicle]
     found = came_in[pairs.front] & automated[pairs.front] & ~automated[pairs.rear]
     return np.asarray(found & (pairs.gap_m < needs_m - 2.0 * EXACT_M))

@@ -143,7 +143,10 @@ def _may_be_behind(
 def _leaves_driver_room(
     users: RoadUsers, own: int, rear: int, slowest_mps: float, laws: OnBoardLaws
 ) -> bool:
-    """Whether a driver behind has what he keeps, and what braking in comfort takes."""
+    """Whether a driver behind has what he keeps, and what braking in comfort takes.
+
+    One who moves has s_0 at least, however fast the vehicle is that merges.
+    """
     safety, rear_mps = laws.safety, users.speed_mps[rear]
     squares = rear_mps**2 - slowest_mps**2
     braking_m = max(squares / (2.0 * safety.driver_mps2), squares / (2.0 * safety.driver_dry_mps2))
@@ -151,7 +154,8 @@ def _leaves_driver_room(
     relax_m = safety.relax_m + safety.relax_at_end_m * share * share
     needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - relax_m
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
-    return bool(free_m >= max(_touching_m(users, rear), needs_m))
+    near_m = min(laws.gaps.of_driver_m, _touching_m(users, rear) + laws.gaps.of_driver_s * rear_mps)
+    return bool(free_m >= max(near_m, needs_m))
 
 
 @kernel

@@ -230,7 +230,7 @@ def with_preset(data: dict[str, Any]) -> dict[str, Any]:
     """Returns scenario data in which keys that a preset sets are filled in where they are not."""
     chosen = data.get("world", {})
     preset = chosen.get("preset") if isinstance(chosen, dict) else None
-    if preset not in PRESETS:
+    if not isinstance(preset, str) or preset not in PRESETS:
         return data
     filled = dict(data)
     for table, values in PRESETS[preset].items():
