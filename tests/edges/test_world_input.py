@@ -22,7 +22,7 @@ def told_of(*settings, strategy="mixed-slots", words=HALF):
     [
         ("world.preset=sunny", "'sunny' is not known; allowed is 'mild', 'hard', 'rtk-5g',"),
         ("world.presett=mild", "unknown key; did you mean preset?"),
-        ('world.preset=["mild"]', "is not known; allowed is 'mild', 'hard',"),
+        ('world.preset=["mild"]', "['mild'] is not known; allowed is 'mild', 'hard',"),
         ("positioning.noise_m=-1.0", "-1 is too small; allowed is at least 0"),
         ("positioning.noise_m=nan", "nan is not finite; allowed is a finite number"),
         ("positioning.noise=1.0", "unknown key; did you mean noise_m?"),

@@ -53,7 +53,7 @@ def test_the_story_tells_what_was_assumed_known_and_done(folder):
     every = "\n".join(t.out for t in told.values())
     for words in (
         "Whoever is ahead brakes at 6 m/s2 at most; it reacts after 0.3 s",
-        "Behind an automated vehicle it keeps 2 m + 0.5 s",
+        "Behind an automated vehicle it keeps 2 m + 0.65 s",
         "A command acts 0.35 s late (dead time 0 s, lag 0.4 s)",
         "for 3 s at most; a command counts for 1.5 s",
         "makes room for r0",

@@ -334,8 +334,8 @@ PROMISES = (
     _fault(
         "SUMO's drivers see shorter gaps than late vehicles keep",
         SETUP,
-        "max(scenario.safety.time_gap_s, law.reaction_s + delay_s)",
-        "max(scenario.safety.time_gap_s, law.reaction_s)",
+        "kept_gap(scenario, safety_law_of(scenario, period_s), delay_s)",
+        "kept_gap(scenario, safety_law_of(scenario, period_s), 0.0)",
         f"{OF_SETUP}::test_drivers_see_gaps_that_are_kept_at_least",
     ),
     _fault(

@@ -376,20 +376,17 @@ def test_automated_vehicles_that_nobody_coordinates_promise_nothing():
 
 
 def test_no_automated_vehicle_leaves_the_mainline():
-    """In a jam SUMO's drivers pass others on the acceleration lane; it must not do so for these.
-
-    With this seed one was let past a driver there, and came back before another who was near.
-    """
+    """SUMO's drivers pass one who has broken down on the acceleration lane; these must not."""
     jammed = {
         "traffic.automated_share": 0.25,
         "safety.time_gap_s": 0.5,
         "safety.standstill_gap_m": 2.0,
-        "world.preset": "hard",
-        "behaviour.brakes_for_nothing_per_h": 40.0,
-        "behaviour.brake_s": 3.0,
+        "incidents.breakdown_s": 40.0,
+        "incidents.station_m": 150.0,
+        "incidents.lasts_s": 40.0,
     }
-    flows = {"mainline_veh_h": 2200.0, "ramp_veh_h": 700.0, "seed": 71}
-    tables, row = driven(overrides=jammed, **flows, horizon_s=90.0)
+    flows = {"mainline_veh_h": 2200.0, "ramp_veh_h": 900.0, "seed": 73}
+    tables, row = driven(overrides=jammed, **flows, horizon_s=120.0)
     outcome = tables.outcome
     leaves = {True: 0, False: 0}
     for k, automated in enumerate(outcome.passages.automated.tolist()):

@@ -27,7 +27,10 @@ def ramps(
     wide: Wide = False,
     kmh: Kmh = False,
 ) -> None:
-    """List the on-ramps of a SUMO network, and whether coramp can coordinate them."""
+    """List the on-ramps of a SUMO network.
+
+    With each stands whether coramp can coordinate it, or why not.
+    """
     from coramp.cli.console import print_json, print_table
     from coramp.cli.ramp_listing import listed, notes_on, only, ramp_rows, ramp_table
     from coramp.networks.net_file import read_network

@@ -27,9 +27,9 @@ def assumed(drove: Drove) -> list[str]:
             f"{safety.reaction_s:g} s, brakes as hard, and has {safety.margin_m:g} m to spare."
         ),
         (
-            f"Behind an automated vehicle it keeps {behind_m:g} m + {behind_s:g} s, behind a "
-            f"driver {gaps.behind_driver_m:g} m + {gaps.behind_driver_s:g} s; for a driver who is "
-            f"to merge it leaves {gaps.for_driver_m:g} m + {gaps.for_driver_s:g} s."
+            f"Behind an automated vehicle it keeps {behind_m:g} m + {behind_s:.2f} s, behind a "
+            f"driver {gaps.behind_driver_m:g} m + {gaps.behind_driver_s:.2f} s; for a driver who "
+            f"is to merge it leaves {gaps.for_driver_m:g} m + {gaps.for_driver_s:g} s."
         ),
         (
             f"A driver keeps {gaps.of_driver_m:g} m + {gaps.of_driver_s:g} s, and brakes at "
