@@ -241,6 +241,13 @@ PROMISES = (
         f"{OF_BOARD}::test_a_driver_behind_need_not_brake_harder_than_in_comfort",
     ),
     _fault(
+        "a driver who moves is left less than his standstill gap",
+        ON_BOARD,
+        "near_m = min(laws.gaps.of_driver_m,",
+        "near_m = min(0.0,",
+        f"{OF_BOARD}::test_a_driver_who_moves_is_left_his_standstill_gap_at_least",
+    ),
+    _fault(
         "a lane change looks at nobody in front",
         ON_BOARD,
         "if front >= 0 and not _may_be_behind(users, own, front, own, ahead, laws):",

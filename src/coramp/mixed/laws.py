@@ -60,8 +60,8 @@ class SafetyLaw(NamedTuple):
     It can stop with ``stop_mps2`` before ``lane_end_m``. A lane change leaves a driver behind
     s_0 + T v and what braking at ``driver_mps2`` takes, less ``relax_m``, and less
     ``relax_at_end_m`` more where the lane ends; one who is slower is judged by ``driver_dry_mps2``
-    on any road. It asks nobody automated for more than
-    ``gentle_mps2``, at the lane's end ``gentle_at_end_mps2`` more.
+    on any road. It asks nobody automated for more than ``gentle_mps2``, at the lane's end
+    ``gentle_at_end_mps2`` more.
     """
 
     braking_mps2: float = 6.0
