@@ -3,6 +3,7 @@
 from tests.faults.fault import Edit, Fault
 
 AIR, LINK = "worlds/faults/air.py", "worlds/faults/link.py"
+NEWEST = "worlds/faults/newest.py"
 POSITIONS, ACTUATORS = "worlds/faults/positions.py", "worlds/faults/actuators.py"
 ON_BOARD, LAWS = "mixed/on_board.py", "mixed/laws.py"
 SETUP, PLANT = "worlds/sumo/mixed_setup.py", "worlds/sumo/mixed_plant.py"
@@ -28,16 +29,16 @@ PROTOCOL = (
     ),
     _fault(
         "an older report takes the place of a newer one",
-        AIR,
-        "if not row[STAMP] <= self._known[number, STAMP]:",
-        "if row[STAMP] == row[STAMP]:",
+        NEWEST,
+        "if not rows[k, stamp] <= now[number, stamp]:",
+        "if rows[k, stamp] == rows[k, stamp]:",
         f"{OF_AIR}::test_older_and_repeated_reports_change_nothing",
     ),
     _fault(
         "an older command takes the place of a newer one",
-        AIR,
-        "and not row[GIVEN] <= self._command[number, GIVEN]",
-        "and row[GIVEN] == row[GIVEN]",
+        NEWEST,
+        "if not rows[k, stamp] <= now[number, stamp]:",
+        "if rows[k, stamp] == rows[k, stamp]:",
         f"{OF_AIR}::test_older_and_repeated_commands_change_nothing",
     ),
     _fault(
@@ -106,8 +107,8 @@ PROTOCOL = (
     _fault(
         "commands count from when they arrive",
         AIR,
-        "                self._command[number] = row\n",
-        "                self._command[number] = [number, now_s, row[MOST], row[MERGE]]\n",
+        "            hears = now_s <",
+        "            received[:, GIVEN] = now_s\n            hears = now_s <",
         f"{OF_AIR}::test_a_command_counts_from_when_it_was_given_not_from_when_it_arrived",
     ),
     _fault(
@@ -141,8 +142,8 @@ PROTOCOL = (
     _fault(
         "who has fallen silent still hears",
         AIR,
-        "                now_s < self._silent_from_s[number]\n                and not",
-        "                self._silent_from_s[number] > -1.0\n                and not",
+        "newest(self._command, received[hears], GIVEN)",
+        "newest(self._command, received, GIVEN)",
         f"{OF_AIR}::test_the_share_that_falls_silent_does_not_report_and_hears_nothing",
     ),
     _fault(

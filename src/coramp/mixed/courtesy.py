@@ -6,8 +6,17 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.mixed.laws import CourtesyLaws, FollowingLaw, SequenceLaw
-from coramp.mixed.sequence import Sequence
+from coramp.mixed.sequence import Sequence, sequence_of
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers, gap_for_m, gap_m
+
+
+@kernel
+def steered_mps2(
+    users: RoadUsers, before: IntArray, leaders: IntArray, laws: CourtesyLaws
+) -> tuple[FloatArray, IntArray]:
+    """Returns the bounds of ``courtesy_mps2`` in the order of ``sequence_of``, and its numbers."""
+    order, behind = sequence_of(users, before, laws)
+    return courtesy_mps2(users, order, leaders, laws), behind
 
 
 @kernel

@@ -245,6 +245,32 @@ def driven_mps2(
 
 
 @kernel
+def driven_and_changes(
+    users: RoadUsers,
+    around: Neighbours,
+    ahead: Ahead,
+    told_mps2: FloatArray,
+    wishes: BoolArray,
+    laws: OnBoardLaws,
+) -> tuple[FloatArray, BoolArray]:
+    """Returns the accelerations of ``driven_mps2``, and who changes lanes of those who wish to.
+
+    Whether a lane change keeps all distances is asked of the speed to which a vehicle slows down
+    if it prepares for one.
+    """
+    accel_mps2 = driven_mps2(users, around, ahead, told_mps2, wishes, laws)
+    changes = np.zeros(len(users.number), np.bool_)
+    if not wishes.any():
+        return accel_mps2, changes
+    for own in range(len(users.number)):
+        if wishes[own]:
+            slower_mps = users.speed_mps[own] + min(0.0, accel_mps2[own]) * laws.period_s
+            slowest_mps = min(slower_mps, ahead.speed_mps[own])
+            changes[own] = may_change_lane(users, own, around, ahead, slowest_mps, laws)
+    return driven_mps2(users, around, ahead, told_mps2, changes, laws), changes
+
+
+@kernel
 def _alone_mps2(users: RoadUsers, own: int, ahead: Ahead, laws: OnBoardLaws) -> float:
     """Towards the speed that it wishes, and to a stop before the acceleration lane ends."""
     following, safety, road, period_s = laws.following, laws.safety, laws.road, laws.period_s

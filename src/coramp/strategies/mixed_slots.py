@@ -1,13 +1,13 @@
 """Mixed traffic: automated vehicles make room for one another, and for drivers who merge."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from coramp.mixed.courtesy import courtesy_mps2
+from coramp.mixed.courtesy import steered_mps2
 from coramp.mixed.laws import CourtesyLaws, FollowingLaw, SequenceLaw
-from coramp.mixed.sequence import sequence_of
 from coramp.mixed.situation import MixedSituation, Places, Steering
 from coramp.strategies.base import Decision, EntryPolicy, Memory, View
 from coramp.strategies.parameters import choice, parameter
@@ -58,14 +58,15 @@ class MixedSlots:
         laws = CourtesyLaws(
             situation.gaps, self._law, FollowingLaw(), situation.road, situation.period_s
         )
-        before = np.array([known.get(number, UNKNOWN) for number in users.number.tolist()])
-        order, behind = sequence_of(users, before, laws)
-        most_mps2 = courtesy_mps2(users, order, situation.around.leader, laws)
         ramp = ~users.on_mainline
-        own = zip(users.number[ramp].tolist(), behind[ramp].tolist(), strict=True)
-        return Steering(most_mps2, ramp & users.automated, tuple(own))
+        there, before = np.flatnonzero(ramp), np.full(len(ramp), UNKNOWN)
+        numbers = users.number[there].tolist()
+        before[there] = [known.get(number, UNKNOWN) for number in numbers]
+        most_mps2, behind = steered_mps2(users, before, situation.around.leader, laws)
+        now = zip(numbers, behind[there].tolist(), strict=True)
+        return Steering(most_mps2, ramp & users.automated, tuple(now))
 
-    @property
+    @cached_property
     def _law(self) -> SequenceLaw:
         law = SequenceLaw(own_weight=self.own_weight, driver_weight=self.driver_weight)
         if self.order == "mainline-first":

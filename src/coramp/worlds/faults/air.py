@@ -16,6 +16,7 @@ from coramp.mixed.situation import Steering
 from coramp.mixed.users import RoadUsers, onwards
 from coramp.scenarios.model import Scenario
 from coramp.worlds.faults.link import ROUNDING_S, LossyLink
+from coramp.worlds.faults.newest import newest
 from coramp.worlds.faults.positions import WrongClocks, WrongPositions
 
 NUMBER, STAMP, STATION, SPEED, ON_MAINLINE, ACCEL = range(6)
@@ -29,13 +30,18 @@ MAKES_ROOM_MPS2, HOLDS_S = 0.5, 2.0
 
 @dataclass
 class Air:
-    """Both links of a run. ``reporting`` is which arrivals tell where they are."""
+    """Both links of a run. ``reporting`` is which arrivals tell where they are.
+
+    ``is_perfect`` is whether everything arrives at once and is right.
+    """
 
     scenario: Scenario
     reporting: BoolArray
     automated: BoolArray
     seed: int
     fallbacks: int = 0
+    is_perfect: bool = field(init=False)
+    _all_report: bool = field(init=False)
     _reports: LossyLink = field(init=False)
     _commands: LossyLink = field(init=False)
     _positions: WrongPositions = field(init=False)
@@ -51,6 +57,9 @@ class Air:
     def __post_init__(self) -> None:
         """Each fault draws from random numbers of its own."""
         scenario, count = self.scenario, len(self.reporting)
+        tables = (scenario.positioning, scenario.clock, scenario.reports, scenario.commands)
+        self.is_perfect = scenario.behaviour.is_perfect and all(t.is_perfect for t in tables)
+        self._all_report = bool(self.reporting.all())
         self._reports = LossyLink(scenario.reports, count, self._random_of("reports"))
         self._commands = LossyLink(scenario.commands, count, self._random_of("commands"))
         positioning = self._random_of("positioning")
@@ -78,24 +87,19 @@ class Air:
         self._lie_m = np.where(self.automated, lies_m, 0.0)
         self._disobeys = self.automated & (disobeys < behaviour.disobeys_share)
 
-    @property
-    def is_perfect(self) -> bool:
-        """Whether everything arrives at once and is right."""
-        scenario = self.scenario
-        tables = (scenario.positioning, scenario.clock, scenario.reports, scenario.commands)
-        return scenario.behaviour.is_perfect and all(table.is_perfect for table in tables)
-
     def heard(self, now_s: float, users: RoadUsers) -> RoadUsers:
         """Returns what the coordinator knows of who is on the road now."""
         if self.is_perfect:
-            known = self.reporting[users.number]
-            return users if known.all() else RoadUsers._make(column[known] for column in users)
+            return self._reporting_of(users)
         self._report(now_s, users)
-        for row in self._reports.received(now_s):
-            number = int(row[NUMBER])
-            if not row[STAMP] <= self._known[number, STAMP]:  # newer, or the first
-                self._known[number] = row
+        self._known = newest(self._known, self._reports.received(now_s), STAMP)
         return self._carried_on(now_s, users)
+
+    def _reporting_of(self, users: RoadUsers) -> RoadUsers:
+        if self._all_report:
+            return users
+        known = self.reporting[users.number]
+        return users if known.all() else RoadUsers._make(column[known] for column in users)
 
     def _report(self, now_s: float, users: RoadUsers) -> None:
         """Sends reports of those whose time has come, with the errors of the moment."""
@@ -151,6 +155,13 @@ class Air:
     def tell(self, now_s: float, seen: RoadUsers, steering: Steering) -> None:
         """Sends to each automated vehicle how much it may speed up and whether it may merge."""
         own = seen.automated
+        if self.is_perfect:
+            number = seen.number[own]
+            self._commands.sent += len(number)
+            self._command[number, GIVEN] = now_s
+            self._command[number, MOST] = steering.most_mps2[own]
+            self._command[number, MERGE] = steering.may_merge[own]
+            return
         rows = np.column_stack(
             [
                 seen.number[own].astype(np.float64),
@@ -169,13 +180,14 @@ class Air:
         where it sees that all distances are kept. Who waited for leave would hold up the ramp. One
         that was to make room on the mainline does not speed up for another ``HOLDS_S``.
         """
-        for row in self._commands.received(now_s):
-            number = int(row[NUMBER])
-            if (
-                now_s < self._silent_from_s[number]
-                and not row[GIVEN] <= self._command[number, GIVEN]
-            ):
-                self._command[number] = row
+        if self.is_perfect:
+            command = self._command[users.number]
+            most_mps2 = np.where(users.automated, command[:, MOST], np.inf)
+            return most_mps2, users.automated & (command[:, MERGE] > 0.5)
+        received = self._commands.received(now_s)
+        if len(received):
+            hears = now_s < self._silent_from_s[received[:, NUMBER].astype(np.int64)]
+            self._command = newest(self._command, received[hears], GIVEN)
         command = self._command[users.number]
         expired_s = now_s - command[:, GIVEN] - self.scenario.commands.valid_s
         valid = expired_s <= ROUNDING_S

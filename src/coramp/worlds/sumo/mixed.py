@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.laws import OnBoardLaws
-from coramp.mixed.on_board import Ahead, driven_mps2, may_change_lane, neighbours_of
+from coramp.mixed.on_board import Ahead, Neighbours, driven_and_changes, neighbours_of
 from coramp.mixed.situation import MixedSituation, MixedStrategy, Places, Steering
 from coramp.mixed.users import RoadUsers, soon
 from coramp.records.outcome import Outcome
@@ -99,6 +97,7 @@ class Moment(NamedTuple):
 
     ``able`` is who is on the acceleration lane and can leave it. ``steering`` has one entry for
     each of those ``seen``, and is None where nobody automated is on the road, or nobody is seen.
+    ``around`` is who is around whom of ``users``, None where nobody has looked yet.
     """
 
     now_s: float
@@ -107,6 +106,7 @@ class Moment(NamedTuple):
     users: RoadUsers
     seen: RoadUsers
     steering: Steering | None
+    around: Neighbours | None = None
 
 
 class Driven(NamedTuple):
@@ -154,7 +154,8 @@ class MixedRun:
             return None
         driven = self.control.driven(moment, self.plant)
         accel_mps2 = self.careless.with_breakdown(moment.now_s, users, driven.accel_mps2)
-        self.control.note(moment, self.plant.ahead(users), accel_mps2, driven.changes)
+        if self.control.notes is not None:
+            self.control.note(moment, self.plant.ahead(users), accel_mps2, driven.changes)
         self.plant.command(moment.names, users, accel_mps2, driven.changes)
         return driven
 
@@ -210,7 +211,8 @@ class Control:
         situation = MixedSituation(now_s, laws.period_s, then, around, laws.gaps, laws.road)
         steering = self.strategy.steer(situation, self.places)
         self.places = steering.places
-        return Moment(now_s, names, able, users, seen, steering)
+        known = around if then is users else None
+        return Moment(now_s, names, able, users, seen, steering, known)
 
     def driven(self, moment: Moment, plant: MixedPlant) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board.
@@ -223,17 +225,11 @@ class Control:
         most_mps2, may_merge = self.air.told(moment.now_s, users)
         if self.notes is not None:
             self.notes.told(moment.now_s, users, moment.seen, most_mps2, self.air)
-        around, ahead = neighbours_of(users), plant.ahead(users)
+        around = neighbours_of(users) if moment.around is None else moment.around
         wishes = may_merge & moment.able & users.automated
-        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, wishes, self.laws)
-        if not wishes.any():
-            return Driven(most_mps2, wishes, accel_mps2, wishes)
-        slower_mps = users.speed_mps + np.minimum(0.0, accel_mps2) * plant.period_s
-        slowest_mps = np.minimum(slower_mps, ahead.speed_mps)
-        changes = np.zeros(len(users.number), np.bool_)
-        for own in np.flatnonzero(wishes).tolist():
-            changes[own] = may_change_lane(users, own, around, ahead, slowest_mps[own], self.laws)
-        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, changes, self.laws)
+        accel_mps2, changes = driven_and_changes(
+            users, around, plant.ahead(users), most_mps2, wishes, self.laws
+        )
         return Driven(most_mps2, wishes, accel_mps2, changes)
 
     def note(

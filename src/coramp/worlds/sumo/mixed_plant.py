@@ -42,6 +42,10 @@ class MixedPlant:
     _was_mps: FloatArray = field(init=False)
     _accel_mps2: FloatArray = field(init=False)
     _changing: set[int] = field(default_factory=set)
+    _lane_numbers: dict[str, int] = field(init=False)
+    _starts_m: FloatArray = field(init=False)
+    _on_mainline: BoolArray = field(init=False)
+    _may_merge: BoolArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Nobody has been sent anywhere yet."""
@@ -49,6 +53,11 @@ class MixedPlant:
         self._sent_mps, self._sent_m = np.full(count, np.nan), np.full(count, np.nan)
         self.largest_error_m = np.where(self.able.automated, 0.0, np.nan)
         self._was_mps, self._accel_mps2 = np.full(count, np.nan), np.zeros(count)
+        lanes = list(self.lane_starts_m)
+        self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
+        self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
+        self._on_mainline = np.array([lane not in RAMP_LANES for lane in lanes], np.bool_)
+        self._may_merge = np.array([lane == MERGE_LANE for lane in lanes], np.bool_)
 
     @property
     def period_s(self) -> float:
@@ -58,24 +67,25 @@ class MixedPlant:
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who is on the acceleration lane, and all that is on the road."""
         names, lanes, position_m, sumo_mps = self.session.everyone()
-        number = np.array([self.able.number[name] for name in names], np.int64)
-        start_m = np.array([self.lane_starts_m[lane] for lane in lanes])
-        station_m = start_m + np.array(position_m)
+        able, number_of, lane_of = self.able, self.able.number, self._lane_numbers
+        number = np.array([number_of[name] for name in names], np.int64)
+        lane = np.array([lane_of[name] for name in lanes], np.int64)
+        station_m = self._starts_m[lane] + np.array(position_m)
         speed_mps = self._known_speeds(number, station_m, np.array(sumo_mps))
         users = RoadUsers(
             number,
             station_m,
             speed_mps,
             self._measured_mps2(number, speed_mps),
-            self.able.length_m[number],
-            np.array([lane not in RAMP_LANES for lane in lanes], np.bool_),
-            self.able.automated[number],
-            self.able.cruise_mps[number],
-            self.able.acceleration_mps2[number],
-            self.able.power_wpkg[number],
-            self.able.braking_mps2[number],
+            able.length_m[number],
+            self._on_mainline[lane],
+            able.automated[number],
+            able.cruise_mps[number],
+            able.acceleration_mps2[number],
+            able.power_wpkg[number],
+            able.braking_mps2[number],
         )
-        return names, np.array([lane == MERGE_LANE for lane in lanes], np.bool_), users
+        return names, self._may_merge[lane], users
 
     def _known_speeds(
         self, number: IntArray, station_m: FloatArray, speed_mps: FloatArray
@@ -117,10 +127,11 @@ class MixedPlant:
                 continue
             self.session.take_over_among_drivers(names[i])
             self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
-        for i in own[users.on_mainline[own]].tolist():
-            if int(users.number[i]) in self._changing:
-                self.session.take_over(names[i])
-                self._changing.discard(int(users.number[i]))
+        if self._changing:
+            for i in own[users.on_mainline[own]].tolist():
+                if int(users.number[i]) in self._changing:
+                    self.session.take_over(names[i])
+                    self._changing.discard(int(users.number[i]))
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self.session.change_lane_now(names[i], 1, self.period_steps)
@@ -154,5 +165,4 @@ class MixedPlant:
         self._sent_m[number] += 0.5 * (before_mps + after_mps) * time_s
         from_mps = (before_mps - accel * half_s).tolist()
         to_mps = np.maximum(0.0, after_mps - accel * half_s).tolist()
-        for name, start, end in zip(names, from_mps, to_mps, strict=True):
-            self.session.drive_evenly(name, start, end, steps)
+        self.session.drive_evenly(names, from_mps, to_mps, steps)

@@ -175,18 +175,27 @@ class Session:
         libsumo.vehicle.setParameter(vehicle_id, "laneChangeModel.lcAssertive", repr(assertive))
 
     def drive_evenly(
-        self, vehicle_id: str, before_mps: float, after_mps: float, steps: int
+        self,
+        vehicle_ids: Sequence[str],
+        before_mps: Sequence[float],
+        after_mps: Sequence[float],
+        steps: int,
     ) -> None:
-        """Commands an even change of speed over steps, from the speed that the last step had.
+        """Commands even changes of speed over steps, from the speeds that the last step had.
 
         Under Euler steps a vehicle goes x = v t + a t^2 / 2 exactly if ``before_mps`` is
-        v - a h / 2 and ``after_mps`` v + a (n - 1/2) h for n steps of h.
+        v - a h / 2 and ``after_mps`` v + a (n - 1/2) h for n steps of h. Nobody is commanded if
+        one of the speeds cannot be.
         """
-        if not math.isfinite(before_mps):
-            raise CorampError(f"SUMO: {vehicle_id}: a speed of {before_mps} m/s cannot be")
-        _check_speed(vehicle_id, after_mps)
-        libsumo.vehicle.setPreviousSpeed(vehicle_id, before_mps)
-        libsumo.vehicle.slowDown(vehicle_id, after_mps, steps * self._step_s)
+        for vehicle_id, before, after in zip(vehicle_ids, before_mps, after_mps, strict=True):
+            if not math.isfinite(before):
+                raise CorampError(f"SUMO: {vehicle_id}: a speed of {before} m/s cannot be")
+            _check_speed(vehicle_id, after)
+        set_previous, slow_down = libsumo.vehicle.setPreviousSpeed, libsumo.vehicle.slowDown
+        time_s = steps * self._step_s
+        for vehicle_id, before, after in zip(vehicle_ids, before_mps, after_mps, strict=True):
+            set_previous(vehicle_id, before)
+            slow_down(vehicle_id, after, time_s)
 
     def change_lane_now(self, vehicle_id: str, lane: int, steps: int) -> None:
         """Commands a lane change in the next step, without SUMO's checks."""
