@@ -7,6 +7,7 @@ NEWEST = "worlds/faults/newest.py"
 POSITIONS, ACTUATORS = "worlds/faults/positions.py", "worlds/faults/actuators.py"
 ON_BOARD, LAWS = "mixed/on_board.py", "mixed/laws.py"
 SETUP, PLANT = "worlds/sumo/mixed_setup.py", "worlds/sumo/mixed_plant.py"
+MOTION = "worlds/sumo/mixed_motion.py"
 JUDGE, MIXED_RUNS = "checker/among_drivers.py", "runs/mixed.py"
 OF_AIR, OF_LINKS = "tests/worlds/test_faulty_air.py", "tests/worlds/test_faulty_links.py"
 OF_BOARD, OF_SLOW = "tests/mixed/test_on_board.py", "tests/mixed/test_slow_actuators.py"
@@ -348,9 +349,9 @@ PROMISES = (
     ),
     _fault(
         "where a vehicle was sent is not compared with where it is",
-        PLANT,
-        "error_m = np.abs(station_m[sent] - self._sent_m[number[sent]])",
-        "error_m = 0.0 * station_m[sent]",
+        MOTION,
+        "error_m = abs(station_m[k] - motion.sent_m[own])",
+        "error_m = 0.0 * station_m[k]",
         "tests/worlds/test_off_course.py::test_a_vehicle_that_is_not_where_it_was_sent_is_found",
     ),
     _fault(

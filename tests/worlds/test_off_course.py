@@ -21,7 +21,7 @@ class Pushed:
     def take_over(self, name):
         pass
 
-    def drive_evenly(self, name, before_mps, after_mps, steps):
+    def drive_evenly(self, names, before_mps, after_mps, steps):
         pass
 
 

@@ -9,6 +9,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import RoadUsers
 from coramp.worlds.faults.actuators import SlowActuators
+from coramp.worlds.sumo.mixed_motion import Motion, measured, sent_evenly
 from coramp.worlds.sumo.mixed_setup import Able
 from coramp.worlds.sumo.network import RAMP_LANES
 from coramp.worlds.sumo.session import Session
@@ -26,7 +27,7 @@ class MixedPlant:
 
     An automated vehicle's speed is that of its commands: under Euler steps SUMO's own is off by
     half a step's acceleration. ``min_gap_m`` is what SUMO has it keep once it is on the
-    mainline. ``largest_error_m`` is how far each was from where it was sent, nan for drivers.
+    mainline.
     """
 
     session: Session
@@ -36,11 +37,7 @@ class MixedPlant:
     step_s: float
     min_gap_m: float
     actuators: SlowActuators
-    largest_error_m: FloatArray = field(init=False)
-    _sent_mps: FloatArray = field(init=False)
-    _sent_m: FloatArray = field(init=False)
-    _was_mps: FloatArray = field(init=False)
-    _accel_mps2: FloatArray = field(init=False)
+    _motion: Motion = field(init=False)
     _changing: set[int] = field(default_factory=set)
     _lane_numbers: dict[str, int] = field(init=False)
     _starts_m: FloatArray = field(init=False)
@@ -50,14 +47,23 @@ class MixedPlant:
     def __post_init__(self) -> None:
         """Nobody has been sent anywhere yet."""
         count = len(self.able.automated)
-        self._sent_mps, self._sent_m = np.full(count, np.nan), np.full(count, np.nan)
-        self.largest_error_m = np.where(self.able.automated, 0.0, np.nan)
-        self._was_mps, self._accel_mps2 = np.full(count, np.nan), np.zeros(count)
+        self._motion = Motion(
+            sent_m=np.full(count, np.nan),
+            sent_mps=np.full(count, np.nan),
+            was_mps=np.full(count, np.nan),
+            accel_mps2=np.zeros(count),
+            largest_error_m=np.where(self.able.automated, 0.0, np.nan),
+        )
         lanes = list(self.lane_starts_m)
         self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
         self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
         self._on_mainline = np.array([lane not in RAMP_LANES for lane in lanes], np.bool_)
         self._may_merge = np.array([lane == MERGE_LANE for lane in lanes], np.bool_)
+
+    @property
+    def largest_error_m(self) -> FloatArray:
+        """How far (m) each vehicle was from where it was sent at most, nan for drivers."""
+        return self._motion.largest_error_m
 
     @property
     def period_s(self) -> float:
@@ -71,12 +77,15 @@ class MixedPlant:
         number = np.array([number_of[name] for name in names], np.int64)
         lane = np.array([lane_of[name] for name in lanes], np.int64)
         station_m = self._starts_m[lane] + np.array(position_m)
-        speed_mps = self._known_speeds(number, station_m, np.array(sumo_mps))
+        share = min(1.0, self.period_s / SMOOTHED_OVER_S)
+        speed_mps, accel_mps2 = measured(
+            number, station_m, np.array(sumo_mps), self._motion, self.period_s, share
+        )
         users = RoadUsers(
             number,
             station_m,
             speed_mps,
-            self._measured_mps2(number, speed_mps),
+            accel_mps2,
             able.length_m[number],
             self._on_mainline[lane],
             able.automated[number],
@@ -86,26 +95,6 @@ class MixedPlant:
             able.braking_mps2[number],
         )
         return names, self._may_merge[lane], users
-
-    def _known_speeds(
-        self, number: IntArray, station_m: FloatArray, speed_mps: FloatArray
-    ) -> FloatArray:
-        """SUMO's speeds for drivers, those of commands for automated vehicles; notes errors."""
-        sent_mps = self._sent_mps[number]
-        sent = ~np.isnan(sent_mps)
-        error_m = np.abs(station_m[sent] - self._sent_m[number[sent]])
-        there = number[sent]
-        self.largest_error_m[there] = np.maximum(self.largest_error_m[there], error_m)
-        return np.where(sent, sent_mps, speed_mps)
-
-    def _measured_mps2(self, number: IntArray, speed_mps: FloatArray) -> FloatArray:
-        """Smoothed accelerations (m/s2) since the last command, 0 of who is new."""
-        was_mps = self._was_mps[number]
-        since_mps = np.where(np.isnan(was_mps), 0.0, speed_mps - was_mps)
-        share = min(1.0, self.period_s / SMOOTHED_OVER_S)
-        self._accel_mps2[number] += share * (since_mps / self.period_s - self._accel_mps2[number])
-        self._was_mps[number] = speed_mps
-        return np.asarray(self._accel_mps2[number])
 
     def ahead(self, users: RoadUsers) -> Ahead:
         """Returns where vehicles will be when a new command begins to act."""
@@ -120,7 +109,7 @@ class MixedPlant:
         """Takes over who is new, and has vehicles change lanes; then all drive for a period."""
         own = np.flatnonzero(users.automated)
         number = users.number[own]
-        new = np.isnan(self._sent_mps[number])
+        new = np.isnan(self._motion.sent_mps[number])
         for i in own[new].tolist():
             if users.on_mainline[i]:
                 self.session.take_over(names[i])
@@ -137,7 +126,8 @@ class MixedPlant:
             self.session.change_lane_now(names[i], 1, self.period_steps)
             self._changing.add(int(users.number[i]))
         chosen = [names[i] for i in own.tolist()]
-        self._sent_m[number], self._sent_mps[number] = users.station_m[own], users.speed_mps[own]
+        self._motion.sent_m[number] = users.station_m[own]
+        self._motion.sent_mps[number] = users.speed_mps[own]
         self._drive(chosen, number, accel_mps2[own])
 
     def _drive(self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray) -> None:
@@ -157,12 +147,5 @@ class MixedPlant:
     def _drive_evenly(
         self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray, steps: int
     ) -> None:
-        time_s, half_s = steps * self.step_s, 0.5 * self.step_s
-        before_mps = self._sent_mps[number]
-        after_mps = np.maximum(0.0, before_mps + accel_mps2 * time_s)
-        accel = (after_mps - before_mps) / time_s
-        self._sent_mps[number] = after_mps
-        self._sent_m[number] += 0.5 * (before_mps + after_mps) * time_s
-        from_mps = (before_mps - accel * half_s).tolist()
-        to_mps = np.maximum(0.0, after_mps - accel * half_s).tolist()
-        self.session.drive_evenly(names, from_mps, to_mps, steps)
+        from_mps, to_mps = sent_evenly(number, accel_mps2, self._motion, steps, self.step_s)
+        self.session.drive_evenly(names, from_mps.tolist(), to_mps.tolist(), steps)

@@ -208,9 +208,9 @@ class Session:
         names = list(vehicle.getIDList())
         return (
             names,
-            [vehicle.getLaneID(name) for name in names],
-            [vehicle.getLanePosition(name) for name in names],
-            [vehicle.getSpeed(name) for name in names],
+            list(map(vehicle.getLaneID, names)),
+            list(map(vehicle.getLanePosition, names)),
+            list(map(vehicle.getSpeed, names)),
         )
 
     def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
