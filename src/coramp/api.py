@@ -16,6 +16,7 @@ from coramp.results import PlanResult, RunResult, StudyResult, as_pandas
 from coramp.runs.beforehand import (
     demand_above_limit,
     demands_above_limit,
+    faults_that_reach_nobody,
     seeds_without_effect,
     without_effect_on_drivers,
 )
@@ -107,6 +108,8 @@ def run(
         notice(line)
     if notice is not None and (line := without_effect_on_drivers([spec])) is not None:
         notice(line)
+    if notice is not None and (line := faults_that_reach_nobody([spec])) is not None:
+        notice(line)
     if notice is not None and seed != 1 and not spec.seed_matters:
         notice(f"arrivals are listed: with {strategy} seed {seed} changes nothing")
     if out is None:
@@ -160,6 +163,8 @@ def study(
     if notice is not None and (line := demands_above_limit(specs)) is not None:
         notice(line)
     if notice is not None and (line := without_effect_on_drivers(specs)) is not None:
+        notice(line)
+    if notice is not None and (line := faults_that_reach_nobody(specs)) is not None:
         notice(line)
     if notice is not None and seeds > 1 and (line := seeds_without_effect(specs)) is not None:
         notice(line)

@@ -52,8 +52,12 @@ def test_other_settings_are_confirmed(tmp_path, settings, engine):
     assert set(verdicts(result).values()) == {CONFIRMED}
 
 
-def test_of_drivers_it_confirms_reports_and_says_what_it_cannot(tmp_path):
-    coramp.run("paper", "uncontrolled", out=tmp_path / "r", **SHORT)
+@pytest.mark.parametrize(
+    ("strategy", "settings"),
+    [("uncontrolled", {}), ("mixed-slots", {"traffic.automated_share": 0.0})],
+)
+def test_of_drivers_it_confirms_reports_and_says_what_it_cannot(tmp_path, strategy, settings):
+    coramp.run("paper", strategy, overrides=settings, out=tmp_path / "r", **SHORT)
     result = audit(tmp_path / "r")
     assert result.holds
     found = verdicts(result)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import coramp
 from coramp import CorampError
-from coramp.runs.beforehand import without_effect_on_drivers
+from coramp.runs.beforehand import faults_that_reach_nobody, without_effect_on_drivers
 from coramp.runs.running import make_spec
 from coramp.scenarios.checks import decision_station_range_m
 from coramp.scenarios.loading import load_scenario
@@ -163,6 +163,26 @@ def test_a_note_says_how_to_vary_drivers_along_and_is_left_out_where_that_is_don
     assert without_effect_on_drivers(along) is None
     crossed = specs(*({gap: a, tau_s: b} for a in (0.6, 1.4) for b in (0.6, 1.4)))
     assert without_effect_on_drivers(crossed) is not None
+
+
+def test_faults_that_reach_nobody_are_told(bare):
+    def specs(strategy, **traffic):
+        faults = {"reports.loss": 0.3, "actuators.lag_s": 0.2, "behaviour.never_yields_share": 0.5}
+        given = faults | {f"traffic.{key}": value for key, value in traffic.items()}
+        return [make_spec(bare(), strategy, overrides=given)]
+
+    of_drivers = "[reports], [actuators]: for coordinated vehicles only; here nobody is coordinated"
+    assert faults_that_reach_nobody(specs("uncontrolled")) == of_drivers
+    none, half = (specs("mixed-slots", automated_share=share) for share in (0.0, 0.5))
+    assert faults_that_reach_nobody(none) == of_drivers
+    assert faults_that_reach_nobody(half) is None
+    assert faults_that_reach_nobody([*none, *half]) is None
+    assert faults_that_reach_nobody([make_spec(bare(), "uncontrolled")]) is None
+
+
+def test_drivers_are_given_once(bare):
+    with pytest.raises(CorampError, match=r"traffic.drivers by --drivers and by --set: given tw"):
+        make_spec(bare(), "uncontrolled", drivers="fair", overrides={"traffic.drivers": "fair"})
 
 
 def test_settings_may_be_in_kmh_and_take_the_place_of_the_files(bare):

@@ -94,7 +94,8 @@ def _audited(inputs: Inputs) -> Audit:
     requests = check_requests(inputs)
     if len(inputs.log.strangers):
         return Audit(folder, (requests, _strangers(inputs), unchecked("all else", "see above")))
-    if not strategy_named(inputs.run.content["strategy"]).cooperative:
+    coordinates = strategy_named(inputs.run.content["strategy"]).cooperative
+    if not (coordinates and inputs.scenario.has_automated):
         return Audit(folder, (requests, *_of_drivers(inputs)))
     decisions, again = check_decisions(inputs)
     motion = ordered(inputs)

@@ -6,7 +6,10 @@ from typing import Any
 from coramp.metrics.delay_bound import lane_headway_s, lane_limit_veh_h
 from coramp.runs.running import RunSpec
 from coramp.scenarios.sections import Safety
+from coramp.strategies.registry import strategy_named
 
+OF_VEHICLES = ("positioning", "clock", "reports", "commands", "actuators")
+"""Tables of the world that coordinated vehicles feel, but drivers do not."""
 OF_AUTOMATION = ("safety.", "motion.")
 """Sections that bind coordinated vehicles, but not drivers."""
 
@@ -60,6 +63,20 @@ def without_effect_on_drivers(specs: Sequence[RunSpec]) -> str | None:
         f"{keys}: for coordinated vehicles only; drivers keep drivers.{population}.tau_s and "
         f"drivers.{population}.min_gap_m instead{_recipe(len(of_drivers))}"
     )
+
+
+def faults_that_reach_nobody(specs: Sequence[RunSpec]) -> str | None:
+    """Returns in a line which tables of the world bind nobody in any of some runs, or None."""
+    found: dict[str, None] = {}
+    for spec in specs:
+        scenario = spec.scenario
+        if strategy_named(spec.strategy).cooperative and scenario.has_automated:
+            return None
+        found |= dict.fromkeys(t for t in OF_VEHICLES if not getattr(scenario, t).is_perfect)
+    if not found:
+        return None
+    tables = ", ".join(f"[{table}]" for table in found)
+    return f"{tables}: for coordinated vehicles only; here nobody is coordinated"
 
 
 def _recipe(runs: int) -> str:

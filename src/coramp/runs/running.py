@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import metadata
@@ -141,9 +141,9 @@ def make_spec(
     others, blame_kmh = overrides_in_mps(overrides or {}, dict.fromkeys(overrides or {}, "--set"))
     values = (mainline_veh_h, ramp_veh_h, horizon_s)
     named = {key: v for key, v in zip(OPTIONS, values, strict=True) if v is not None}
-    if twice := sorted(named.keys() & others.keys()):
-        options = ", ".join(f"{key} by {OPTIONS[key]} and by --set" for key in twice)
-        raise CorampError(f"{blamed or '--set'}: {options}: given twice; allowed is once")
+    _check_given_once(
+        named if drivers is None else {**named, "traffic.drivers": drivers}, others, blamed
+    )
     blame = {**blame_kmh, **{key: OPTIONS[key] for key in named}}
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
@@ -162,6 +162,16 @@ def make_spec(
     elif chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def _check_given_once(
+    by_options: Collection[str], settings: Collection[str], blamed: str | None
+) -> None:
+    """Raises CorampError for keys that are given by an option of their own and by a setting."""
+    if twice := sorted(set(by_options) & set(settings)):
+        options = {**OPTIONS, "traffic.drivers": "--drivers"}
+        told = ", ".join(f"{key} by {options[key]} and by --set" for key in twice)
+        raise CorampError(f"{blamed or '--set'}: {told}: given twice; allowed is once")
 
 
 def _check_types(scenario: Scenario, strategy: type[Strategy]) -> None:
