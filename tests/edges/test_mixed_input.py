@@ -123,7 +123,7 @@ def test_what_was_not_kept_is_not_explained(folder):
         ]
     refused = invoke("explain", folder, "r00001", "--plot", folder / "p.png")
     assert_refused(refused)
-    assert "so that there is none to explain" in refused.errors[0]
+    assert "--plot: it draws a plan" in refused.errors[0]
     with pytest.raises(CorampError, match="so that there is none to plot"):
         coramp.load(folder).plot_decision("r00001")
 

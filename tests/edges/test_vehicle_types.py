@@ -105,7 +105,7 @@ def test_what_does_not_fit_is_refused_in_one_line(tables, line):
 def test_a_name_that_is_no_text_is_refused(name):
     (line,) = problems({"name": name, "share": 1.0})
     assert line.startswith("vehicle.0.name: ")
-    assert line.endswith("input should be a valid string")
+    assert line.endswith("is not a text; allowed is one text in quotes")
 
 
 def test_a_type_longer_than_the_acceleration_lane_is_refused():

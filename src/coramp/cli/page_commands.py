@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from coramp.cli.options import Json, Kmh, ScenarioName, Wide
+from coramp.errors import CorampError
 
 showing = typer.Typer(rich_markup_mode=None)
 
@@ -29,7 +30,12 @@ def explain(
     from coramp.records.run_folder import read_run
 
     run = read_run(folder)
-    if is_told_apart(run) and plot is None:
+    if is_told_apart(run):
+        if plot is not None:
+            raise CorampError(
+                "--plot: it draws a plan, and vehicles among drivers drive without plans; leave "
+                "it out to read what the vehicle did"
+            )
         mixed = mixed_story_in(run, vehicle, folder)
         if json:
             print_json(mixed_story_json(mixed))

@@ -125,6 +125,8 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
             return [f"{key}: {shown} is {_out_of_range(key, float(value), context)}"]
         case "float_type" | "int_type":
             return [f"{key}: {shown} is not a number; allowed is a number"]
+        case "string_type":
+            return [f"{key}: {shown} is not a text; allowed is one text in quotes"]
         case "literal_error":
             return [f"{key}: {shown} is not known; allowed is {context['expected']}"]
         case "model_type" | "dict_type" | "model_attributes_type":
