@@ -12,6 +12,13 @@ from coramp.road.streams import STREAMS
 from coramp.scenarios.speeds_kmh import KEYS, LIST, in_mps
 
 Location = tuple[int | str, ...]
+OTHER_KIND = {
+    "float_type": "not a number; allowed is a number",
+    "int_type": "not a number; allowed is a number",
+    "finite_number": "not finite; allowed is a finite number",
+    "string_type": "not a text; allowed is one text in quotes",
+}
+"""What a value of another kind than a key's is."""
 SHAPES = ("(one)", "(list)")
 """Tags of a value that may be one or a list; they are no part of its key."""
 
@@ -119,14 +126,10 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
             return [f"{key}: unknown key; {_allowed_keys(model, problem['loc'])}"]
         case "missing":
             return [f"{key}: is missing; {_how_to_give(problem['loc'])}"]
-        case "finite_number":
-            return [f"{key}: {shown} is not finite; allowed is a finite number"]
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             return [f"{key}: {shown} is {_out_of_range(key, float(value), context)}"]
-        case "float_type" | "int_type":
-            return [f"{key}: {shown} is not a number; allowed is a number"]
-        case "string_type":
-            return [f"{key}: {shown} is not a text; allowed is one text in quotes"]
+        case kind if kind in OTHER_KIND:
+            return [f"{key}: {shown} is {OTHER_KIND[kind]}"]
         case "literal_error":
             return [f"{key}: {shown} is not known; allowed is {context['expected']}"]
         case "model_type" | "dict_type" | "model_attributes_type":
