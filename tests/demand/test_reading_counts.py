@@ -191,16 +191,16 @@ def test_a_long_flow_keeps_its_number(file):
             3,
             "300,600,M,0,car,120,90",
             (
-                "row 5: a mean speed of 90 m/s; allowed is up to 55 m/s; speeds in km/h belong into "
-                "mean_speed_kmh"
+                "row 5: a mean speed of 90 m/s; allowed is up to 55 m/s; "
+                "speeds in km/h belong into mean_speed_kmh"
             ),
         ),
         (
             3,
             "300,600,M,0,car,1400,24",
             (
-                "row 5: 1412 vehicles in 300 s are 16944 veh/h; allowed are up to 2600 veh/h a lane; "
-                "counts per hour belong into flow_veh_h"
+                "row 5: 1412 vehicles in 300 s are 16944 veh/h; "
+                "allowed are up to 2600 veh/h a lane; counts per hour belong into flow_veh_h"
             ),
         ),
         (
@@ -342,8 +342,8 @@ def test_an_hour_missing_on_another_day_is_a_gap(file):
             [row for row in ROWS if not row.startswith("300,600,M")],
             [100, 95, 90],
             (
-                "row 3: M lane 0 has no row from 300 to 600 s: filled in from the counts before and "
-                "behind"
+                "row 3: M lane 0 has no row from 300 to 600 s: "
+                "filled in from the counts before and behind"
             ),
         ),
     ],

@@ -1,7 +1,6 @@
 """Who arrives when: random headways and entry speeds, the same for every strategy."""
 
 import math
-import zlib
 from collections.abc import Sequence
 from itertools import count
 from operator import itemgetter
@@ -10,18 +9,13 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
+from coramp.demand.generators import generator
+from coramp.demand.measured import drawn_arrivals
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import Mainline, Ramp, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
 from coramp.vehicles.traits import CAR, Traits
-
-
-def generator(seed: int, purpose: str) -> np.random.Generator:
-    """Returns the random generator of one purpose; another purpose never shifts it."""
-    return np.random.default_rng(
-        np.random.SeedSequence(seed, spawn_key=(zlib.crc32(purpose.encode()),))
-    )
 
 
 def arrival_times_s(
@@ -88,6 +82,11 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
     """
     if scenario.arrivals:
         given = _explicit_arrivals(scenario)
+    elif scenario.demand:
+        given = [
+            *_measured_arrivals(scenario, False, seed),
+            *_measured_arrivals(scenario, True, seed),
+        ]
     else:
         given = [
             *_stream_arrivals(scenario, False, scenario.mainline, seed),
@@ -124,6 +123,13 @@ def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
         rest = _rest(scenario, kind, arrival.speed_mps, top_mps, arrival.length_m)
         found.append((step, arrival.stream == "ramp", *rest))
     return found
+
+
+def _measured_arrivals(scenario: Scenario, on_ramp: bool, seed: int) -> list[Unnamed]:
+    return [
+        (one.step, on_ramp, *_rest(scenario, one.kind, one.speed_mps, one.top_mps))
+        for one in drawn_arrivals(scenario, on_ramp, seed)
+    ]
 
 
 def _rest(

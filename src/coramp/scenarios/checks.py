@@ -7,6 +7,7 @@ from coramp.equations.gaps import least_acceleration_mps2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.errors import CorampError
+from coramp.scenarios.demand_checks import demand_problems, detector_problems
 from coramp.scenarios.vehicle_checks import vehicle_problems
 from coramp.scenarios.world_checks import world_problems
 from coramp.strategies.parameters import wrong_settings, wrong_together
@@ -25,6 +26,7 @@ def problems_of(scenario: "Scenario") -> list[str]:
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
     problems += [*_motion_problems(scenario), *_driver_problems(scenario)]
     problems += [*vehicle_problems(scenario), *world_problems(scenario)]
+    problems += [*demand_problems(scenario), *detector_problems(scenario)]
     return problems or _planning_problems(scenario)
 
 
@@ -93,6 +95,8 @@ def _place_problems(scenario: "Scenario") -> list[str]:
 def _flow_problems(scenario: "Scenario") -> list[str]:
     if scenario.arrivals:
         return _list_problems(scenario)
+    if scenario.demand:
+        return []  # its parts are checked each
     problems = []
     for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
         most = 3600.0 / stream.min_headway_s

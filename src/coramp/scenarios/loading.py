@@ -5,7 +5,9 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.scenarios.defaults import with_defaults, with_populations
+from coramp.scenarios.demand_flows import with_demand_flows
 from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
+from coramp.scenarios.measured import with_counts
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
@@ -29,7 +31,8 @@ def load_scenario(
     overrides, blamed = overrides_in_mps(overrides, blamed)
     data = with_populations(data)
     data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
-    data = with_preset(data)
+    data = with_counts(with_preset(data), label, blamed)
+    data = with_demand_flows(data, label, blamed)
     data = with_defaults(with_listed_flows(data, label, blamed), label)
     return validated(Scenario, data, label, {**in_kmh, **blamed})
 

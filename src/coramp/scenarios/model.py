@@ -9,7 +9,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -18,6 +20,7 @@ from coramp.equations.safe_distance import braking_distance_m
 from coramp.errors import CorampError
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
+from coramp.scenarios.demand_sections import CountsFile, DemandPart, Detector
 from coramp.scenarios.quantities import FASTEST_MPS
 from coramp.scenarios.sections import (
     Controller,
@@ -91,6 +94,18 @@ class Scenario(Model):
     road: RoadSurface = RoadSurface()
     behaviour: Behaviour = Behaviour()
     incidents: Incidents = Incidents()
+    demand: Annotated[tuple[DemandPart, ...], Field(strict=False)] = ()
+    counts: CountsFile | None = None
+    detector: Annotated[tuple[Detector, ...], Field(strict=False)] = ()
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_used(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A scenario without these tables is written, and hashed, as if there were no such."""
+        data: dict[str, Any] = handler(self)
+        for name in ("demand", "counts", "detector"):
+            if not data.get(name):
+                data.pop(name, None)
+        return data
 
     @field_validator("strategy", mode="before")
     @classmethod
