@@ -13,7 +13,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Name = Annotated[str, Field(min_length=1, pattern=r"^[^\s<>&\"',;]+$")]
 Lane = Annotated[int, Field(ge=0, le=9)]
-Period = Annotated[float, Field(ge=1.0, le=3600.0)]
+Period = Annotated[float, Field(ge=60.0, le=3600.0)]
 
 
 class Table(BaseModel):
