@@ -58,9 +58,7 @@ def loops_of(
 
 
 def lanes_at(plan: RoadPlan, detector: Detector) -> list[tuple[str, float]]:
-    """Returns SUMO's lanes of a detector's road at its station, from the outermost, and where each
-    begins (m).
-    """
+    """Returns SUMO's lanes of a road at a detector, from the outermost, and their starts (m)."""
     starts_m = plan.lane_starts_m()
     return [
         (lane, starts_m[lane])
