@@ -6,7 +6,7 @@ earlier, by the time that they take to it undisturbed.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from coramp.scenarios.demand_sections import DemandPart
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.vehicle_types import VehicleType
 
+Name = TypeVar("Name", int, str)
 FREE_MPS2 = 2.0
 """About how hard vehicles speed up from where they enter."""
 
@@ -56,21 +57,25 @@ def drawn_arrivals(scenario: Scenario, on_ramp: bool, seed: int) -> list[Drawn]:
 def groups_of(scenario: Scenario, on_ramp: bool) -> list[Group]:
     """Returns the demand of a route by interval and lane, with whole numbers of each type.
 
-    A fraction of a vehicle is carried on to the next interval, so that sums stay.
+    A fraction of a vehicle is carried on to the next interval, so that sums stay. What is not said
+    to enter on a lane is shared out to all as the scenario's shares of lanes say.
     """
     route = STREAMS[on_ramp]
     start_m = getattr(scenario, route).start_m
-    carried: dict[int, dict[str, float]] = {}
+    carried: dict[tuple[str, int | str | None], dict[Any, float]] = {}
     found: dict[tuple[float, float, int], Group] = {}
     parts = [part for part in scenario.demand if part.route == route]
     for part in sorted(parts, key=lambda part: (part.begin_s, part.lane or 0)):
-        lane = part.lane or 0
         station_m = start_m if part.station_m is None else part.station_m
-        group = Group(part.begin_s, part.end_s, lane, station_m, {})
-        counts = found.setdefault((part.begin_s, part.end_s, lane), group).counts
         shares = _shares(scenario, on_ramp, part)
-        for name, count in _whole(part, shares, carried.setdefault(lane, {})).items():
-            counts[name] = counts.get(name, 0) + count
+        rest = carried.setdefault(("type", part.lane), {})
+        for name, count in shared_out(part.count, part.vehicles, shares, rest).items():
+            rest = carried.setdefault(("lane", name), {})
+            lanes = _lanes(scenario, on_ramp, part)
+            for lane, here in shared_out(count, count, lanes, rest).items():
+                group = Group(part.begin_s, part.end_s, lane, station_m, {})
+                counts = found.setdefault((part.begin_s, part.end_s, lane), group).counts
+                counts[name] = counts.get(name, 0) + here
     return [found[key] for key in sorted(found) if any(found[key].counts.values())]
 
 
@@ -83,15 +88,25 @@ def _shares(scenario: Scenario, on_ramp: bool, part: DemandPart) -> Mapping[str,
     return {kind.name: kind.share_of(on_ramp) for kind in scenario.vehicle_types}
 
 
-def _whole(
-    part: DemandPart, shares: Mapping[str, float], carried: dict[str, float]
-) -> dict[str, int]:
-    """How many of each type come, whole numbers; ``carried`` is what is left over, and changed."""
-    exact = {name: share * part.count + carried.get(name, 0.0) for name, share in shares.items()}
-    total = part.vehicles
+def _lanes(scenario: Scenario, on_ramp: bool, part: DemandPart) -> Mapping[int, float]:
+    """Which share of a part of demand enters on each lane."""
+    if part.lane is not None or on_ramp:
+        return {part.lane or 0: 1.0}
+    return dict(enumerate(scenario.mainline.shares))
+
+
+def shared_out(
+    count: float, total: int | None, shares: Mapping[Name, float], carried: dict[Name, float]
+) -> dict[Name, int]:
+    """Returns how many of ``count`` vehicles each has by its share: whole numbers.
+
+    They sum to ``total``; left out, to the count as near as whole numbers are. ``carried`` is what
+    is left over of each, from before, and is changed.
+    """
+    exact = {name: share * count + carried.get(name, 0.0) for name, share in shares.items()}
     if total is None:
         total = max(0, math.floor(sum(exact.values()) + 0.5 - 1e-9))
-    whole = {name: max(0, math.floor(count + 1e-9)) for name, count in exact.items()}
+    whole = {name: max(0, math.floor(value + 1e-9)) for name, value in exact.items()}
     left = total - sum(whole.values())
     by_rest = sorted(exact, key=lambda name: whole[name] - exact[name])
     for k in range(abs(left)):

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
 SAME_S = 1e-6
 SHARES_WITHIN = 1e-6
-LANES = 1
-"""So many lanes each road has."""
 
 Numbered = tuple[int, DemandPart]
 
@@ -28,8 +26,13 @@ def demand_problems(scenario: "Scenario") -> list[str]:
         return problems
     for on_ramp, route in enumerate(STREAMS):
         here = [(k, part) for k, part in enumerate(scenario.demand) if part.route == route]
-        for lane in sorted({part.lane or 0 for _, part in here}):
-            own = [found for found in here if (found[1].lane or 0) == lane]
+        lanes = {part.lane for _, part in here}
+        if None in lanes and len(lanes) > 1:
+            k = next(k for k, part in here if part.lane is None)
+            problems.append(f"demand.{k}.lane: is missing; allowed is one in each part of {route}")
+            continue
+        for lane in lanes:
+            own = [found for found in here if found[1].lane == lane]
             problems += _together(scenario, bool(on_ramp), own)
     return problems
 
@@ -51,8 +54,9 @@ def _part_problems(scenario: "Scenario", part: DemandPart) -> Iterator[str]:
         total = sum(part.shares.values())
         if abs(total - 1.0) > SHARES_WITHIN:
             yield f"shares: they sum to {total:g}; allowed is 1"
-    if part.lane is not None and part.lane >= LANES:
-        yield f"lane: the {part.route} has no lane {part.lane}; allowed is up to {LANES - 1}"
+    lanes = scenario.mainline.lanes if part.route == STREAMS[0] else 1
+    if part.lane is not None and part.lane >= lanes:
+        yield f"lane: the {part.route} has no lane {part.lane}; allowed is up to {lanes - 1}"
     yield from _station_problems(scenario, part.route, part.station_m)
 
 
@@ -69,6 +73,8 @@ def _station_problems(scenario: "Scenario", route: str, station_m: float | None)
 def _together(scenario: "Scenario", on_ramp: bool, parts: Sequence[Numbered]) -> Iterator[str]:
     """Intervals of a lane are the same or do not overlap, and hold no more than fit."""
     headway_s = (scenario.ramp if on_ramp else scenario.mainline).min_headway_s
+    if not on_ramp and parts[0][1].lane is None:
+        headway_s *= max(scenario.mainline.shares)  # of the lane that most enter on
     ordered = sorted(parts, key=lambda found: (found[1].begin_s, found[1].end_s))
     (number, until), count = ordered[0], 0.0
     for k, part in ordered:
@@ -89,7 +95,7 @@ def _together(scenario: "Scenario", on_ramp: bool, parts: Sequence[Numbered]) ->
         if count * headway_s > length_s:
             yield (
                 f"demand.{k}: {count:g} vehicles in {length_s:g} s cannot come with headways of "
-                f"{headway_s:g} s or more; allowed are up to {int(length_s / headway_s)}"
+                f"{headway_s:.2g} s or more; allowed are up to {int(length_s / headway_s)}"
             )
 
 

@@ -26,8 +26,6 @@ KNOWN_AS = {
     "trailer": TRUCK,
 }
 """Classes of detectors by another name, and the built-in type that they are of."""
-LANES = 1
-"""So many lanes each road has."""
 
 
 class _OnlyCounts(Table):
@@ -60,7 +58,7 @@ def with_counts(data: Mapping[str, Any], label: str, origins: Mapping[str, str])
             f"{blamed}: counts.sha256: {path} has changed since: its hash is {digest}; "
             f"allowed is {source.sha256}"
         )
-    counts = _read(path, digest, source)
+    counts = _read(path, digest, source, _lanes_of(data))
     parts = demand_of(counts, source, _types_of(data), _stations(data), blamed)
     return {**data, COUNTS: {**data[COUNTS], "sha256": digest}, DEMAND: parts}
 
@@ -74,17 +72,29 @@ def _digest(path: Path) -> str:
         ) from error
 
 
-def _read(path: Path, digest: str, source: CountsFile) -> Counts:
+def _lanes_of(data: Mapping[str, Any]) -> int:
+    """How many lanes the mainline has; what is not valid is told later."""
+    mainline = data.get("mainline")
+    lanes = mainline.get("lanes", 1) if isinstance(mainline, Mapping) else 1
+    return lanes if isinstance(lanes, int) else 1
+
+
+def _read(path: Path, digest: str, source: CountsFile, lanes: int) -> Counts:
     upstream = (source.mainline, source.ramp)
-    return _read_once(str(path), digest, source.repair, upstream, source.downstream)
+    return _read_once(str(path), digest, source.repair, upstream, source.downstream, lanes)
 
 
 @lru_cache(maxsize=8)
 def _read_once(
-    path: str, _digest: str, repair: bool, upstream: tuple[str, str], downstream: str | None
+    path: str,
+    _digest: str,
+    repair: bool,
+    upstream: tuple[str, str],
+    downstream: str | None,
+    lanes: int,
 ) -> Counts:
     """Reads a file once, however many runs of a study refer to it."""
-    return read_counts(path, repair, LANES, upstream=upstream, downstream=downstream)
+    return read_counts(path, repair, lanes, upstream=upstream, downstream=downstream)
 
 
 def demand_of(

@@ -21,6 +21,7 @@ from coramp.errors import CorampError
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
 from coramp.scenarios.demand_sections import CountsFile, DemandPart, Detector
+from coramp.scenarios.network_section import NetworkSection
 from coramp.scenarios.quantities import FASTEST_MPS
 from coramp.scenarios.sections import (
     Controller,
@@ -76,6 +77,7 @@ class Scenario(Model):
     description: str = ""
     mainline: Mainline
     ramp: Ramp
+    network: NetworkSection | None = None
     vehicle: Vehicles = Vehicle()
     safety: Safety = Safety()
     motion: Motion = Motion()
@@ -168,6 +170,11 @@ class Scenario(Model):
         return not all(getattr(self, table).is_perfect for table in TABLES)
 
     @property
+    def has_one_lane(self) -> bool:
+        """Whether its road is coramp's own of one mainline lane, for which all strategies plan."""
+        return self.network is None and self.mainline.lanes == 1
+
+    @property
     def has_automated(self) -> bool:
         """Whether some vehicle of this scenario may be automated."""
         kinds = [(kind.name, ramp) for kind in self.vehicle_types for ramp in (False, True)]
@@ -246,6 +253,8 @@ class Scenario(Model):
     def decision_station_m(self) -> float:
         """Where ramp vehicles are planned: as given, or as suits the speeds."""
         given = self.ramp.decision_station_m
+        if given is None and not self.has_one_lane:
+            return 0.5 * self.ramp.start_m  # nobody is planned there
         return chosen_decision_station_m(self) if given is None else given
 
     @property
