@@ -18,7 +18,7 @@ SUMO = "sumo"
 """The folder of SUMO's own files in that of a run."""
 SUMO_COPIES = ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml")
 SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS = "net.net.xml", "command.txt", "loops.add.xml"
-SUMO_FILES = (*SUMO_COPIES, SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS)
+SUMO_FILES = (*SUMO_COPIES, SUMO_NETWORK, f"{SUMO_NETWORK}.gz", SUMO_COMMAND, SUMO_LOOPS)
 """What it may hold."""
 OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in (*TABLES, MESSAGES))})
 NAMED_AT_MOST = 3
