@@ -42,7 +42,7 @@ class LanedPlant(MixedPlant):
         spans = [self.road.lanes[lane] for lane in lanes]
         number = np.array([self.able.number[name] for name in names], np.int64)
         station_m = _stations_m(spans, position_m)
-        speed_mps = self._known_speeds(number, station_m, np.array(sumo_mps))
+        speed_mps, accel_mps2 = self._measured(number, station_m, sumo_mps)
         self.lane = np.array([span.lane for span in spans], np.int64)
         self._sumo_lane = {
             name: int(lane.rpartition("_")[2]) for name, lane in zip(names, lanes, strict=True)
@@ -51,7 +51,7 @@ class LanedPlant(MixedPlant):
             number,
             station_m,
             speed_mps,
-            self._measured_mps2(number, speed_mps),
+            accel_mps2,
             self.able.length_m[number],
             self.lane > RAMP_LANE,
             self.able.automated[number],
@@ -106,7 +106,7 @@ class LanedControl(Control):
         """Returns what the strategy answers to what it has heard of the outer lanes."""
         outer = _chosen(users, self._lane <= OUTERMOST)
         moment = super().decided(now_s, names, able, outer)
-        return moment._replace(users=users)
+        return moment._replace(users=users, around=None)
 
     @property
     def _lane(self) -> IntArray:

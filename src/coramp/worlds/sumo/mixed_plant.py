@@ -77,10 +77,7 @@ class MixedPlant:
         number = np.array([number_of[name] for name in names], np.int64)
         lane = np.array([lane_of[name] for name in lanes], np.int64)
         station_m = self._starts_m[lane] + np.array(position_m)
-        share = min(1.0, self.period_s / SMOOTHED_OVER_S)
-        speed_mps, accel_mps2 = measured(
-            number, station_m, np.array(sumo_mps), self._motion, self.period_s, share
-        )
+        speed_mps, accel_mps2 = self._measured(number, station_m, sumo_mps)
         users = RoadUsers(
             number,
             station_m,
@@ -95,6 +92,13 @@ class MixedPlant:
             able.braking_mps2[number],
         )
         return names, self._may_merge[lane], users
+
+    def _measured(
+        self, number: IntArray, station_m: FloatArray, sumo_mps: Sequence[float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Speeds (m/s) and accelerations (m/s2) of who is on the road now."""
+        share = min(1.0, self.period_s / SMOOTHED_OVER_S)
+        return measured(number, station_m, np.array(sumo_mps), self._motion, self.period_s, share)
 
     def ahead(self, users: RoadUsers) -> Ahead:
         """Returns where vehicles will be when a new command begins to act."""
