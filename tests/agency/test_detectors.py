@@ -1,0 +1,146 @@
+"""Loops from trajectories: worked by hand, and against SUMO's own on the same run."""
+
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+import sumo
+
+import coramp
+from coramp.agency.detectors import detectors_of, detectors_table
+from coramp.agency.motion import motion_of
+from coramp.agency.sumo_detectors import definition_xml, output_xml, router_csv, router_xml
+from coramp.worlds.sumo.network import sumo_binary
+from tests.agency import motion_by_hand
+from tests.metrics import PAPER, Car
+
+TRAFFIC = {"mainline_veh_h": 1600.0, "ramp_veh_h": 400.0, "horizon_s": 240.0, "seed": 3}
+
+
+def rows_of(table, detector):
+    return table.filter(detector=detector).rows(named=True)
+
+
+def test_a_loop_counts_fronts_speeds_and_for_how_long_it_is_covered():
+    # Both pass -390 m; one at 20 m/s covers it for 0.25 s, one at 10 m/s for 0.5 s.
+    cars = [
+        Car("m1", [(0.0, -400.0, 20.0, 0.0)], exit_s=40.0),
+        Car("m2", [(9.0, -400.0, 10.0, 0.0)], entry_s=9.0, exit_s=89.0),
+    ]
+    table = detectors_table(motion_by_hand(cars, 89.0), 10.0)
+    first, second = rows_of(table, "mainline_in")[:2]
+    assert (first["vehicles"], first["passed"], second["vehicles"], second["passed"]) == (1, 1, 1, 1)
+    assert first["flow_veh_h"] == pytest.approx(360.0)
+    assert first["mean_speed_mps"] == pytest.approx(20.0)
+    assert first["occupancy_percent"] == pytest.approx(2.5)
+    assert second["occupancy_percent"] == pytest.approx(5.0)
+    whole = rows_of(detectors_table(motion_by_hand(cars, 89.0)), "mainline_in")[0]
+    assert whole["mean_speed_mps"] == pytest.approx(15.0)
+    assert whole["harmonic_speed_mps"] == pytest.approx(2.0 / (1 / 20.0 + 1 / 10.0))
+    assert whole["mean_length_m"] == 5.0
+
+
+def test_a_loop_of_the_mainline_does_not_see_the_acceleration_lane():
+    # Merges at 5 s, 80 m behind the nose: it passes 150 m on the mainline, 0 m on the ramp.
+    car = Car("r1", [(0.0, 0.0, 16.0, 0.0)], merge_s=5.0, exit_s=25.0)
+    late = Car("r2", [(0.0, 0.0, 16.0, 0.0)], merge_s=10.0, exit_s=25.0)
+    assert PAPER.detector_station_m == 150.0
+    table = detectors_table(motion_by_hand([car, late], 25.0))
+    assert rows_of(table, "mainline_merge")[0]["vehicles"] == 1
+    assert rows_of(table, "mainline_out")[0]["vehicles"] == 2
+
+
+def test_places_are_those_of_sumos_network():
+    found = {d.name: (d.lane, d.position_m, d.kind) for d in detectors_of(PAPER)}
+    assert found == {
+        "mainline_in": ("mainline_0", 10.0, "source"),
+        "mainline_upstream": ("mainline_0", 200.0, "between"),
+        "ramp_in": ("ramp_0", 10.0, "source"),
+        "mainline_merge": ("merge_1", 150.0, "between"),
+        "mainline_out": ("downstream_0", 170.0, "sink"),
+    }
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A run of drivers whose files are kept, and what SUMO's own loops counted in it."""
+    folder = tmp_path_factory.mktemp("loops") / "run"
+    run = coramp.run(
+        "paper", "uncontrolled", drivers="credible", out=folder, keep_sumo=True, **TRAFFIC
+    )
+    place = folder / "sumo"
+    loops = detectors_of(run.scenario)
+    (place / "own.add.xml").write_text(definition_xml(loops, 60.0, "own.xml"))
+    command = shlex.split((place / "command.txt").read_text())
+    command = [sumo_binary("sumo"), *command[1:], "--additional-files", "own.add.xml"]
+    subprocess.run(command, cwd=place, check=True, capture_output=True)
+    return run, ET.parse(place / "own.xml").getroot().findall("interval")
+
+
+def test_loops_count_what_sumos_loops_count(kept):
+    run, intervals = kept
+    table = detectors_table(motion_of(run), 60.0)
+    ours = {(r["detector"], r["from_s"]): r for r in table.iter_rows(named=True)}
+    compared = 0
+    for interval in intervals:
+        own = ours.get((interval.get("id"), float(interval.get("begin"))))
+        if own is None or own["to_s"] - own["from_s"] < 60.0:
+            continue
+        compared += own["vehicles"]
+        assert own["vehicles"] == int(interval.get("nVehEntered"))
+        assert own["passed"] == int(interval.get("nVehContrib"))
+        assert own["occupancy_percent"] == pytest.approx(
+            float(interval.get("occupancy")), abs=0.4
+        )
+        assert own["mean_speed_mps"] == pytest.approx(float(interval.get("speed")), abs=0.15)
+        assert own["mean_length_m"] == pytest.approx(float(interval.get("length")))
+    assert compared > 300
+
+
+def test_the_output_is_written_as_sumo_writes_it(kept):
+    run, intervals = kept
+    written = ET.fromstring(output_xml(detectors_table(motion_of(run), 60.0)))
+    assert {i.tag for i in written} == {"interval"}
+    assert list(written[0].attrib) == list(intervals[0].attrib)
+    assert [i.get("id") for i in written[:5]] == [i.get("id") for i in intervals[:5]]
+
+
+def test_flowrouter_reads_what_is_exported(kept, tmp_path):
+    """SUMO's own tool finds flows that go from both sources to the sink."""
+    run, _ = kept
+    loops, table = detectors_of(run.scenario), detectors_table(motion_of(run), 60.0)
+    (tmp_path / "det.xml").write_text(router_xml(loops))
+    (tmp_path / "flows.csv").write_text(router_csv(table))
+    from coramp.worlds.sumo.network import network_file, road_plan
+
+    tool = Path(sumo.SUMO_HOME) / "tools" / "detector" / "flowrouter.py"
+    subprocess.run(
+        [
+            *(sys.executable, str(tool), "-n", str(network_file(road_plan(run.scenario)))),
+            *("-d", "det.xml", "-f", "flows.csv", "-o", "routes.xml", "-e", "emitted.xml"),
+        ],
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+    )
+    flows = ET.parse(tmp_path / "emitted.xml").getroot().findall("flow")
+    emitted = {f.get("id"): int(f.get("number")) for f in flows}
+    totals = dict(table.group_by("detector").agg(cars=table["vehicles"].sum()).iter_rows())
+    assert totals
+    by_source = {
+        name: sum(n for key, n in emitted.items() if key.startswith(name))
+        for name in ("mainline_in", "ramp_in")
+    }
+    for name, number in by_source.items():
+        assert number == table.filter(detector=name)["vehicles"].sum()
+
+
+def test_counts_for_routers_are_in_minutes_and_km_h():
+    cars = [Car("m1", [(0.0, -400.0, 20.0, 0.0)], exit_s=40.0)]
+    lines = router_csv(detectors_table(motion_by_hand(cars, 40.0), 30.0)).splitlines()
+    assert lines[0] == "Detector;Time;qPKW;qLKW;vPKW;vLKW"
+    assert lines[1] == "mainline_in;0;1;0;72.00;0.00"
+    assert "mainline_out;0.5;1;0;72.00;0.00" in lines
