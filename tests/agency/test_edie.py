@@ -12,9 +12,7 @@ from tests.metrics import Car
 
 
 def spent(motion, edges_s, edges_m, weights=None):
-    return spent_in_cells(
-        motion, motion.on_mainline, np.array(edges_s), np.array(edges_m), weights
-    )
+    return spent_in_cells(motion, motion.on_mainline, np.array(edges_s), np.array(edges_m), weights)
 
 
 def test_a_cell_has_the_time_and_the_way_of_who_is_in_it():
@@ -44,8 +42,13 @@ def test_who_stands_spends_time_and_no_way():
 def test_flow_density_and_speed_are_edies():
     """Three at 20 m/s, 4 s apart: 900 veh/h, 12.5 veh/km. Where each is 50 m long for 2.5 s."""
     cars = [
-        Car(f"m{k}", [(4.0 * k, -400.0, 20.0, 0.0)], scheduled_s=4.0 * k, entry_s=4.0 * k,
-            exit_s=40.0 + 4.0 * k)
+        Car(
+            f"m{k}",
+            [(4.0 * k, -400.0, 20.0, 0.0)],
+            scheduled_s=4.0 * k,
+            entry_s=4.0 * k,
+            exit_s=40.0 + 4.0 * k,
+        )
         for k in range(3)
     ]
     table = contour_table(motion_by_hand(cars, 48.0))
@@ -85,9 +88,9 @@ def test_weights_count_a_truck_twice():
 def test_cells_sum_to_all_that_was_driven(legs):
     rows, time_s, station_m = [], 0.0, 0.0
     for lasts_s, accel_mps2, speed_mps in legs:
-        accel_mps2 = max(accel_mps2, -speed_mps / lasts_s)
-        rows.append((time_s, station_m, speed_mps, accel_mps2))
-        station_m += (speed_mps + 0.5 * accel_mps2 * lasts_s) * lasts_s
+        forward_mps2 = max(accel_mps2, -speed_mps / lasts_s)
+        rows.append((time_s, station_m, speed_mps, forward_mps2))
+        station_m += (speed_mps + 0.5 * forward_mps2 * lasts_s) * lasts_s
         time_s += lasts_s
     motion = motion_by_hand([Car("m1", rows, exit_s=time_s)], time_s)
     found = spent(motion, np.arange(0.0, 140.0, 7.0), np.arange(0.0, 5000.0, 33.0))

@@ -163,8 +163,10 @@ def test_densities_count_lanes_and_trucks():
 
 
 def test_the_merge_influence_area_reaches_1500_feet():
-    longer = PAPER.model_copy(update={"mainline": PAPER.mainline.model_copy(update={"end_m": 900.0})})
-    assert MERGE_INFLUENCE_M == pytest.approx(1500 * 0.3048)
+    longer = PAPER.model_copy(
+        update={"mainline": PAPER.mainline.model_copy(update={"end_m": 900.0})}
+    )
+    assert pytest.approx(1500 * 0.3048) == MERGE_INFLUENCE_M
     assert [(s.kind, s.start_m, s.end_m) for s in segments_of(longer)] == [
         ("basic", PAPER.mainline.start_m, 0.0),
         ("merge", 0.0, 457.2),
@@ -202,9 +204,7 @@ def test_congestion_is_where_the_mainline_is_slow():
 
 
 def test_percentiles_are_of_whole_trips():
-    cars = [
-        Car(f"m{k}", [(0.0, -400.0, V0, 0.0)], entry_s=0.0, exit_s=40.0 + k) for k in range(21)
-    ]
+    cars = [Car(f"m{k}", [(0.0, -400.0, V0, 0.0)], entry_s=0.0, exit_s=40.0 + k) for k in range(21)]
     table = travel_times_table(motion_by_hand(cars, 61.0)).filter(stream="mainline")
     whole, first = table.rows(named=True)
     assert whole["vehicles"] == first["vehicles"] == 21

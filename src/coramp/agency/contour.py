@@ -59,9 +59,9 @@ class Cells(NamedTuple):
 def cells_of(motion: Motion, name: str, cell_s: float = CELL_S, cell_m: float = CELL_M) -> Cells:
     """Returns the cells of a road; those at its end may be shorter, none is longer."""
     road = road_of(motion.scenario, name)
-    edges_s = np.arange(max(1, math.ceil(motion.end_s / cell_s - 1e-9)) + 1) * cell_s
+    edges_s = np.arange(max(1, math.ceil(motion.end_s / cell_s - 1e-9)) + 1.0) * cell_s
     inner_m = np.arange(math.ceil((road.end_m - road.start_m) / cell_m - 1e-9)) * cell_m
-    edges_m = np.append(road.start_m + inner_m, road.end_m)
+    edges_m = np.append(road.start_m + inner_m, road.end_m).astype(np.float64)
     on_road = motion.on_mainline == road.is_mainline
     return Cells(road, edges_s, edges_m, spent_in_cells(motion, on_road, edges_s, edges_m))
 

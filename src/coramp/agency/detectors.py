@@ -28,8 +28,8 @@ FROM_START_M, FROM_END_M = 10.0, 30.0
 class Detector(NamedTuple):
     """A loop: a place on the mainline, or on the ramp with its acceleration lane.
 
-    ``lane`` and ``position_m`` say the same of SUMO's network; ``kind`` is what ``flowrouter`` and
-    ``dfrouter`` call source, between and sink.
+    ``lane`` and ``position_m`` say the same of SUMO's network. ``kind`` is what routers call it:
+    source, between or sink; none where some vehicles pass beside it, on the acceleration lane.
     """
 
     name: str
@@ -50,7 +50,7 @@ def detectors_of(scenario: Scenario) -> list[Detector]:
         ("mainline_in", True, mainline.start_m + FROM_START_M, "source"),
         ("mainline_upstream", True, loop_station_m(scenario), "between"),
         ("ramp_in", False, ramp.start_m + FROM_START_M, "source"),
-        ("mainline_merge", True, scenario.detector_station_m, "between"),
+        ("mainline_merge", True, scenario.detector_station_m, ""),
         ("mainline_out", True, mainline.end_m - FROM_END_M, "sink"),
     )
     return [
@@ -91,7 +91,7 @@ def _rows(motion: Motion, detector: Detector, edges_s: FloatArray) -> pl.DataFra
     heavy = is_heavy(motion)[fronts.vehicle]
 
     def summed(values: FloatArray, chosen: BoolArray | slice = slice(None)) -> FloatArray:
-        return np.bincount(place[chosen], values[chosen], minlength=bins)
+        return np.bincount(place[chosen], values[chosen], minlength=bins).astype(np.float64)
 
     ones, slowness = np.ones(len(place)), ratio(np.ones(len(place)), fronts.speed_mps, np.inf)
     counts, trucks = summed(ones), summed(ones, heavy)

@@ -95,10 +95,13 @@ def overlap_s(from_s: FloatArray, until_s: FloatArray, edges_s: FloatArray) -> F
     """Returns how long (s) each span lasts within each interval, one row a span."""
     low = np.maximum(from_s[:, None], edges_s[None, :-1])
     high = np.minimum(until_s[:, None], edges_s[None, 1:])
-    return np.maximum(0.0, high - low)
+    overlap: FloatArray = np.maximum(0.0, high - low)
+    return overlap
 
 
-def ratio(above: FloatArray, below: FloatArray, where_none: float = np.nan) -> FloatArray:
+def ratio(
+    above: FloatArray | IntArray, below: FloatArray | IntArray, where_none: float = np.nan
+) -> FloatArray:
     """Returns quotients; ``where_none`` where the divisor is 0."""
     found = np.full(np.shape(above), where_none)
     np.divide(above, below, out=found, where=np.asarray(below) > 0.0)

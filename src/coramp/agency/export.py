@@ -27,7 +27,9 @@ def export(folder: Path, out: Path) -> list[Path]:
 
     Raises CorampError where there is neither, and where the folder to write holds anything.
     """
-    with staged_folder(out, lambda _: "holds other files; give another or an empty folder") as stage:
+    with staged_folder(
+        out, lambda _: "holds other files; give another or an empty folder"
+    ) as stage:
         texts = _texts(folder)
         for name, text in texts.items():
             write_text(stage / name, text)

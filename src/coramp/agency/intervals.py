@@ -28,7 +28,7 @@ from coramp.vehicles.traits import MASS
 def edges_of(motion: Motion, interval_s: float = INTERVAL_S) -> FloatArray:
     """Returns the edges (s) of intervals from 0 until the run ends; the last one may be shorter."""
     end_s = motion.end_s or interval_s
-    edges_s = np.arange(math.ceil(end_s / interval_s - 1e-9) + 1) * interval_s
+    edges_s = np.arange(math.ceil(end_s / interval_s - 1e-9) + 1, dtype=np.float64) * interval_s
     edges_s[-1] = min(edges_s[-1], end_s)
     return edges_s
 
@@ -57,7 +57,7 @@ def _rows_of(
     way_m = way_by_interval_m(motion, edges_s)[own].sum(axis=0)
     exits = _counts(motion.exit_s[own], edges_s)
     due = _bins(motion.scheduled_s[own], edges_s)
-    arrivals = np.bincount(due, minlength=bins)
+    arrivals = np.bincount(due, minlength=bins).astype(np.int64)
     return frame_of(
         INTERVALS,
         stream=[STREAMS[on_ramp]] * bins,
@@ -86,7 +86,7 @@ def _bins(times_s: FloatArray, edges_s: FloatArray) -> IntArray:
 
 def _counts(times_s: FloatArray, edges_s: FloatArray) -> IntArray:
     known_s = times_s[~np.isnan(times_s)]
-    return np.bincount(_bins(known_s, edges_s), minlength=len(edges_s) - 1)
+    return np.bincount(_bins(known_s, edges_s), minlength=len(edges_s) - 1).astype(np.int64)
 
 
 def states_at(motion: Motion, vehicle: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -176,8 +176,8 @@ def breakdowns(motion: Motion, edges_s: FloatArray) -> tuple[FloatArray, BoolArr
     found = passings(motion, True, loop_station_m(scenario))
     by_mainline = ~motion.on_ramp[found.vehicle]
     place = _bins(found.time_s[by_mainline], edges_s)
-    counts = np.bincount(place, minlength=bins)
-    sums_mps = np.bincount(place, found.speed_mps[by_mainline], minlength=bins)
+    counts = np.bincount(place, minlength=bins).astype(np.int64)
+    sums_mps = np.bincount(place, found.speed_mps[by_mainline], minlength=bins).astype(np.float64)
     least_mps = QUEUE_SPEED * scenario.mainline.speed_mps
     queued = queued_intervals(sums_mps, counts, least_mps)
     return ratio(sums_mps, counts), sustained(queued)

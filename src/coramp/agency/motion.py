@@ -101,7 +101,7 @@ def motion_of(run: RunRecords) -> Motion:
     return Motion(
         scenario=run.scenario,
         on_ramp=(vehicles["stream"] == "ramp").to_numpy(),
-        vehicle_type=tuple(_or_else(vehicles, "vehicle_type", CAR)),
+        vehicle_type=tuple(map(str, _or_else(vehicles, "vehicle_type", CAR))),
         traits=_traits(vehicles, run.scenario),
         scheduled_s=scheduled_s,
         entry_s=_floats(vehicles, "entry_s"),

@@ -29,11 +29,12 @@ def definition_xml(detectors: Sequence[Detector], period_s: float, output: str) 
 
 
 def router_xml(detectors: Sequence[Detector]) -> str:
-    """Returns the loops as ``flowrouter.py`` and ``dfrouter`` take them."""
+    """Returns the loops that all vehicles of a road pass, as ``flowrouter.py`` takes them."""
     lines = [
         f"    <detectorDefinition id={quoteattr(d.name)} lane={quoteattr(d.lane)} "
         f'pos="{d.position_m:.2f}" type="{d.kind}"/>'
         for d in detectors
+        if d.kind
     ]
     return "\n".join(["<detectors>", *lines, "</detectors>", ""])
 

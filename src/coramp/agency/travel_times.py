@@ -1,5 +1,7 @@
 """Travel times of each stream: percentiles of all, and of who was due in each interval."""
 
+from itertools import pairwise
+
 import numpy as np
 import polars as pl
 
@@ -15,19 +17,21 @@ PERCENTILES = (15, 50, 85, 95)
 
 
 def travel_times_table(motion: Motion, interval_s: float = INTERVAL_S) -> pl.DataFrame:
-    """Returns one row a stream, and one a stream and interval, with the columns of ``TRAVEL_TIMES``.
+    """Returns one row a stream, and one a stream and interval, with ``TRAVEL_TIMES``' columns.
 
     A travel time counts from when a vehicle was due, with its wait outside. Percentiles are of
     those that left the zone; the others are counted.
     """
     edges_s = edges_of(motion, interval_s)
-    spans = [(0.0, float(edges_s[-1])), *zip(edges_s[:-1].tolist(), edges_s[1:].tolist())]
+    spans = [(0.0, float(edges_s[-1])), *pairwise(edges_s.tolist())]
     rows = []
     for on_ramp in (False, True):
         for place, (from_s, to_s) in enumerate(spans):
             due = (motion.scheduled_s >= from_s) & (motion.scheduled_s < to_s)
             own = (motion.on_ramp == on_ramp) & (due if place else True)
-            rows.append({"stream": STREAMS[on_ramp], "from_s": from_s, "to_s": to_s, **_of(motion, own)})
+            rows.append(
+                {"stream": STREAMS[on_ramp], "from_s": from_s, "to_s": to_s, **_of(motion, own)}
+            )
     return pl.DataFrame(rows, schema=TRAVEL_TIMES)
 
 

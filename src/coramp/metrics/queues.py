@@ -71,8 +71,8 @@ def _queued(outcome: Outcome, station_m: float, least_mps: float, intervals: int
     time_s, speed_mps = crossings(driven, np.flatnonzero(~passages.on_ramp), station_m)
     inside = time_s < intervals * INTERVAL_S
     place = (time_s[inside] / INTERVAL_S).astype(np.int64)
-    sums = np.bincount(place, speed_mps[inside], minlength=intervals)
-    counts = np.bincount(place, minlength=intervals)
+    sums = np.bincount(place, speed_mps[inside], minlength=intervals).astype(np.float64)
+    counts = np.bincount(place, minlength=intervals).astype(np.int64)
     return queued_intervals(sums, counts, least_mps)
 
 
