@@ -72,6 +72,10 @@ def compare(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the two-page summary (html).")
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw speeds and queues of the first seed (png, svg or pdf)."),
+    ] = None,
     json: Json = False,
     wide: Wide = False,
     kmh: Kmh = False,
@@ -79,11 +83,17 @@ def compare(
     """Compare runs before and after, with intervals over seeds."""
     from coramp.agency.before_after import changes_json, paired
     from coramp.cli.console import print_json, print_table, written
-    from coramp.report.page.summary import before_after_table
+    from coramp.report.contour_figure import both_figure
+    from coramp.report.page.summary import before_after_table, names_of
+    from coramp.report.style import save_plot
     from coramp.report.writing import compared
+    from coramp.studies.speed_unit import KMH, MPS
 
     pairs = paired(before, after)
     page = None if out is None else compared(out, pairs, kmh=kmh)
+    if plot is not None:
+        runs, unit = pairs[0], KMH if kmh else MPS
+        save_plot(lambda: both_figure(runs, names_of(runs), unit), plot)
     if json:
         print_json(changes_json(pairs))
         return

@@ -49,10 +49,16 @@ def before_after_table(pairs: Pairs) -> Table:
     return _table(pairs, changes(pairs))
 
 
-def _part(words: Iterator[str], table: Table, runs: Sequence[Measured], unit: SpeedUnit) -> Row:
+def names_of(runs: Sequence[Measured]) -> list[str]:
+    """Returns what the runs are called in pictures: of two, which is before and which after."""
     names = [title_of(measured.run) for measured in runs]
-    if len(runs) > 1:
-        names = [f"{when}: {name}" for when, name in zip((BEFORE, AFTER), names, strict=True)]
+    if len(runs) == 1:
+        return names
+    return [f"{when}: {name}" for when, name in zip((BEFORE, AFTER), names, strict=True)]
+
+
+def _part(words: Iterator[str], table: Table, runs: Sequence[Measured], unit: SpeedUnit) -> Row:
+    names = names_of(runs)
     seed = f"seed {runs[0].run.summary['seed']}"
     return {
         "words": list(words),
@@ -158,7 +164,9 @@ def _collisions(change: Change) -> str:
 
 
 def _unserved(left: int) -> str:
-    return f"{left} vehicles do not get through" if left else "every vehicle gets through"
+    if not left:
+        return "every vehicle gets through"
+    return f"{left} vehicles do not get through" if left > 1 else "1 vehicle does not get through"
 
 
 def _queues(found: dict[str, float | None]) -> str:
