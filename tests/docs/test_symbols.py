@@ -9,6 +9,8 @@ from typing import Annotated, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 
+from coramp.agency.figures import FIGURES
+from coramp.agency.schemas import AGENCY
 from coramp.cli.ramp_listing import ramp_rows
 from coramp.messages import kinds
 from coramp.networks.net_file import read_network
@@ -28,6 +30,11 @@ from tests.mathematics import mathematics
 PAGE = Path(__file__).parents[2] / "docs" / "symbols.md"
 UNITS = {
     "veh_h": "veh/h",
+    "veh_km": "veh/km",
+    "pc_km_ln": "pc/km/ln",
+    "pc_mi_ln": "pc/mi/ln",
+    "percent": "%",
+    "min": "min",
     "mps3": "m/s3",
     "mps2": "m/s2",
     "mps": "m/s",
@@ -35,6 +42,8 @@ UNITS = {
     "wpkg": "W/kg",
     "kg": "kg",
     "km": "km",
+    "per_h": "",
+    "h": "h",
     "m": "m",
     "s": "s",
     "l": "l",
@@ -54,6 +63,8 @@ FILES = {
     "on_board.parquet": schemas.ON_BOARD,
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
+    **{f"{name}.csv": columns for name, columns in AGENCY.items()},
+    "coramp compare --json": FIGURES,
 }
 RAMPS = "coramp ramps --json"
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}

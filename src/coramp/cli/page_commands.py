@@ -1,4 +1,4 @@
-"""Commands that tell and show what was computed: explain, report, replay, studio, figures."""
+"""Commands that tell and show what was computed: explain, report, compare, export, and others."""
 
 from pathlib import Path
 from typing import Annotated
@@ -67,6 +67,58 @@ def report(
     from coramp.report.writing import report as write_report
 
     written(write_report(folder, against, kmh=kmh))
+
+
+@showing.command(epilog="Example: coramp compare out/before out/after --out compared.html")
+def compare(
+    before: Annotated[
+        Path, typer.Argument(metavar="BEFORE", help="A folder of a run, or of runs, one a seed.")
+    ],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", help="The same, on the same arrivals.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the two-page summary (html).")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw speeds and queues of the first seed (png, svg or pdf)."),
+    ] = None,
+    json: Json = False,
+    wide: Wide = False,
+    kmh: Kmh = False,
+) -> None:
+    """Compare runs before and after, with intervals over seeds."""
+    from coramp.agency.before_after import changes_json, paired
+    from coramp.cli.console import print_json, print_table, written
+    from coramp.report.contour_figure import both_figure
+    from coramp.report.page.summary import before_after_table, names_of
+    from coramp.report.style import save_plot
+    from coramp.report.writing import compared
+    from coramp.studies.speed_unit import KMH, MPS
+
+    pairs = paired(before, after)
+    page = None if out is None else compared(out, pairs, kmh=kmh)
+    if plot is not None:
+        runs, unit = pairs[0], KMH if kmh else MPS
+        save_plot(lambda: both_figure(runs, names_of(runs), unit), plot)
+    if json:
+        print_json(changes_json(pairs))
+        return
+    print_table(before_after_table(pairs), wide)
+    if page is not None:
+        written(page)
+
+
+@showing.command(epilog="Example: coramp export out/r out/tables")
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of a run or a study.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="A new folder for the tables.")],
+) -> None:
+    """Write every table as CSV, and loops in SUMO's formats."""
+    from coramp.agency.export import export as exported
+    from coramp.cli.console import counted
+
+    files = exported(folder, out)
+    print(f"Written: {counted(len(files), 'file')} to {out}: {', '.join(f.name for f in files)}.")
 
 
 @showing.command(epilog="Example: coramp replay out/r --against out/u")

@@ -30,7 +30,7 @@ def queue_figures(outcome: Outcome, scenario: Scenario) -> dict[str, float | Non
     None for all where it did not, and for the flow before where it had no 15 min yet. Only
     intervals within the horizon count.
     """
-    station_m = max(LOOP_M, 0.5 * scenario.mainline.start_m)
+    station_m = loop_station_m(scenario)
     intervals = int(scenario.simulation.horizon_s / INTERVAL_S + 1e-9)
     queued = _queued(outcome, station_m, QUEUE_SPEED * scenario.mainline.speed_mps, intervals)
     start = _breakdown(queued)
@@ -41,6 +41,11 @@ def queue_figures(outcome: Outcome, scenario: Scenario) -> dict[str, float | Non
     after = exits[start:][queued[start:]]
     flows = (_flow_veh_h(before), _flow_veh_h(after))
     return {"breakdown_time_s": start * INTERVAL_S, **dict(zip(FLOWS, flows, strict=True))}
+
+
+def loop_station_m(scenario: Scenario) -> float:
+    """Returns the station (m) of the loop upstream."""
+    return max(LOOP_M, 0.5 * scenario.mainline.start_m)
 
 
 FLOWS = ("prebreakdown_flow_veh_h", "discharge_flow_veh_h")
@@ -66,12 +71,29 @@ def _queued(outcome: Outcome, station_m: float, least_mps: float, intervals: int
     time_s, speed_mps = crossings(driven, np.flatnonzero(~passages.on_ramp), station_m)
     inside = time_s < intervals * INTERVAL_S
     place = (time_s[inside] / INTERVAL_S).astype(np.int64)
-    sums = np.bincount(place, speed_mps[inside], minlength=intervals)
-    counts = np.bincount(place, minlength=intervals)
-    queued = np.zeros(intervals, np.bool_)
-    for k in range(intervals):
-        queued[k] = sums[k] < least_mps * counts[k] if counts[k] else k > 0 and queued[k - 1]
+    sums = np.bincount(place, speed_mps[inside], minlength=intervals).astype(np.float64)
+    counts = np.bincount(place, minlength=intervals).astype(np.int64)
+    return queued_intervals(sums, counts, least_mps)
+
+
+def queued_intervals(sums_mps: FloatArray, counts: IntArray, least_mps: float) -> BoolArray:
+    """Returns whether vehicles passed slower than ``least_mps`` on average, interval by interval.
+
+    ``sums_mps`` are the sums of their speeds; where nobody passes it is as it was.
+    """
+    queued = np.zeros(len(counts), np.bool_)
+    for k in range(len(counts)):
+        queued[k] = sums_mps[k] < least_mps * counts[k] if counts[k] else k > 0 and queued[k - 1]
     return queued
+
+
+def sustained(queued: BoolArray) -> BoolArray:
+    """Returns which intervals belong to a queue that lasts for at least ``SUSTAINED`` of them."""
+    lasts = np.zeros(len(queued), np.bool_)
+    for k in range(len(queued) - SUSTAINED + 1):
+        if queued[k : k + SUSTAINED].all():
+            lasts[k : k + SUSTAINED] = True
+    return lasts
 
 
 def _breakdown(queued: BoolArray) -> int | None:

@@ -14,6 +14,7 @@ import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - the API's annotations name it
+from matplotlib.figure import SubFigure
 
 from coramp.errors import CorampError
 from coramp.records.files import write_bytes
@@ -142,7 +143,7 @@ def grid(*many: Axes) -> None:
         axes.set_axisbelow(True)
 
 
-def legend_below(figure: Figure, sources: Iterable[Axes], columns: int) -> None:
+def legend_below(figure: Figure | SubFigure, sources: Iterable[Axes], columns: int) -> None:
     """Writes one legend under a figure, with each label once."""
     found: dict[str, Artist] = {}
     for axes in sources:

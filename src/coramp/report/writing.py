@@ -3,12 +3,13 @@
 import shlex
 from pathlib import Path
 
+from coramp.agency.before_after import Pairs
 from coramp.errors import CorampError
 from coramp.records.files import write_text
 from coramp.records.run import RunRecords
 from coramp.records.run_folder import MARK, REPLAY, REPORT, read_run
 from coramp.records.schemas import Row
-from coramp.report.page.pages import replay_page, run_page
+from coramp.report.page.pages import compared_page, replay_page, run_page
 from coramp.report.page.study_page import study_page
 from coramp.scenarios.toml_files import builtin_names, override_text
 from coramp.studies.speed_unit import KMH, MPS
@@ -59,6 +60,17 @@ def replay(folder: str | Path, against: str | Path | None = None) -> Path:
     runs = [read_run(Path(name)) for name in (folder, against) if name is not None]
     target = Path(folder) / REPLAY
     _write_page(target, replay_page(runs))
+    return target
+
+
+def compared(target: Path, pairs: Pairs, *, kmh: bool = False) -> Path:
+    """Writes the two-page summary of runs before and after, a pair a seed; returns its path.
+
+    With ``kmh`` speeds are in km/h, else in m/s. Raises CorampError where it cannot be written.
+    """
+    if target.suffix.lower() != ".html":
+        raise CorampError(f"--out: {target}: is no page; allowed are html files")
+    _write_page(target, compared_page(pairs, KMH if kmh else MPS))
     return target
 
 

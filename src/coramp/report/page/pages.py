@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from coramp.agency.before_after import Measured, Pairs
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
 from coramp.records.schemas import MIXED_METRICS, Row
@@ -10,6 +11,7 @@ from coramp.records.world_told import told_of_world
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
+from coramp.report.page.summary import summary_of, summary_of_pairs
 from coramp.road.streams import STREAMS
 from coramp.runs.running import broken_promises
 from coramp.scenarios.world_sections import TABLES
@@ -62,6 +64,21 @@ def run_page(
         repeat="\n".join(repeat),
         files={},
         mixed=any(run.is_mixed for run in runs),
+        summary=summary_of([Measured(run) for run in runs], unit),
+    )
+
+
+def compared_page(pairs: Pairs, unit: SpeedUnit = MPS) -> str:
+    """Returns the page of the summary alone, of runs before and after, a pair a seed."""
+    before, after = (measured.run for measured in pairs[0])
+    seeds = ", ".join(str(one.run.summary["seed"]) for one, _ in pairs)
+    return assembled(
+        "summary.html",
+        title=f"Before and after: {title_of(before)}, {title_of(after)}",
+        subtitle=f"{after.scenario.name}, {after.flows}, seeds {seeds}",
+        runs={},
+        cells=[],
+        summary=summary_of_pairs(pairs, unit),
     )
 
 
