@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 import coramp
-from coramp.agency.before_after import Measured, changes, paired
+from coramp.agency.before_after import Change, Measured, changes, paired
 from coramp.agency.detectors import detectors_of
 from coramp.agency.export import LOOP_FILES, csv_text
 from coramp.agency.figures import FIGURES, densest_pc_mi_ln, letter_of
@@ -16,7 +16,7 @@ from coramp.agency.motion import motion_of
 from coramp.agency.schemas import AGENCY
 from coramp.agency.tables import agency_tables
 from coramp.errors import CorampError
-from coramp.report.page.summary import summary_of, summary_of_pairs
+from coramp.report.page.summary import compared_words, summary_of, summary_of_pairs
 from coramp.report.writing import report
 from coramp.studies.statistics import estimate
 from tests.agency import motion_by_hand, run_by_hand
@@ -32,10 +32,10 @@ SEEDS = (1, 2, 3)
 def folders(tmp_path_factory):
     """Runs before and after with three seeds, in a folder each."""
     root = tmp_path_factory.mktemp("agency")
-    for name, strategy in (("before", "ramp-priority"), ("after", "mainline-priority")):
+    for name, time_gap_s in (("before", 1.2), ("after", 0.0)):
         for seed in SEEDS:
-            out = root / name / str(seed)
-            coramp.run("paper", strategy, engine="exact", seed=seed, out=out, **TRAFFIC)
+            own = {"overrides": {"safety.time_gap_s": time_gap_s}, "out": root / name / str(seed)}
+            coramp.run("paper", engine="exact", seed=seed, **own, **TRAFFIC)
     return root
 
 
@@ -48,8 +48,8 @@ def test_runs_are_paired_by_seed(pairs):
     seeds = [(a.run.summary["seed"], b.run.summary["seed"]) for a, b in pairs]
     assert seeds == [(1, 1), (2, 2), (3, 3)]
     for before, after in pairs:
-        assert before.run.summary["strategy"] == "ramp-priority"
-        assert after.run.summary["strategy"] == "mainline-priority"
+        assert before.run.scenario.safety.time_gap_s == 1.2
+        assert after.run.scenario.safety.time_gap_s == 0.0
 
 
 def test_differences_are_taken_seed_by_seed(pairs):
@@ -116,18 +116,41 @@ def test_words_say_what_the_table_says(pairs):
     found = summary_of_pairs(pairs)
     words = " ".join(found["words"])
     by = {change.key: change for change in changes(pairs)}
-    for key in ("time_spent_h", "mainline_delay_s", "ramp_delay_s", "co2_kg"):
+    told = ("time_spent_h", "mainline_delay_s", "ramp_delay_s", "co2_kg")
+    for key in told:
         digits = FIGURES[key].digits
         assert f"{by[key].after.mean:.{digits}f}" in words
         assert f"{by[key].before.mean:.{digits}f} before" in words
     assert "1600 vehicles an hour on the mainline and 500 on the ramp over 2 minutes" in words
     assert "3 draws of arrivals" in words
     assert "Traffic breaks down neither before nor after" in words
-    assert ("this is sure" in words) or ("this may be chance" in words)
+    sure = [by[key].is_sure for key in told]
+    assert words.count("this is sure") == sum(sure)
+    assert words.count("this may be chance") == len(told) - sum(sure)
+    assert by["time_spent_h"].change.mean < 0.0
+    assert words.count(" less (") == len(told)
     rows = {row[0]: row[1:] for row in found["table"].rows}
     label = FIGURES["mainline_delay_s"].label
     assert rows[label][0] == f"{by['mainline_delay_s'].before.mean:.1f}"
     assert "±" in rows[label][2]
+
+
+@pytest.mark.parametrize(
+    ("after", "words"),
+    [
+        ([8.0, 9.0], "They emit 8.5 kg after, 10.0 before: 1.5 less (15 %); this may be chance."),
+        ([8.0, 8.2], "They emit 8.1 kg after, 10.0 before: 1.9 less (19 %); this is sure."),
+        ([12.0, 12.2], "They emit 12.1 kg after, 10.0 before: 2.1 more (21 %); this is sure."),
+        ([10.01, 10.02], "They emit 10.0 kg after, 10.0 before: no difference."),
+        ([8.0], "They emit 8.0 kg after, 10.0 before: 2.0 less (20 %)."),
+    ],
+)
+def test_a_sentence_says_whether_the_difference_is_sure(after, words):
+    before = [10.0] * len(after)
+    change = Change(
+        "co2_kg", estimate(before), estimate(after), estimate([a - 10.0 for a in after])
+    )
+    assert compared_words(change, "They emit", "kg") == words
 
 
 def test_a_run_alone_has_a_summary_of_its_own(pairs):

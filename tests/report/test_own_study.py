@@ -263,7 +263,9 @@ def test_the_report_of_a_run_has_speed_and_delay_over_time_too(tmp_path):
     coramp.run("paper", engine="exact", horizon_s=60.0, out=out)
     assert invoke("report", out, "--kmh").code == 0
     text = (out / "report.html").read_text()
-    assert len(captions(text)) == 2
+    ours = [line.split(" (")[0].split(" at ")[0] for line in captions(text)]
+    assert ours[:2] == ["Speed on the mainline", "Queues over time"]  # the summary's
+    assert ours[2:] == ["Mean speed over time", "Mean delay over time"]
     assert "-400 to 400 m, 72 km/h" in text
     assert "mainline speed (km/h)" in text
     told = float(re.search(r"mainline speed \(km/h\)</td><td[^>]*>([\d.]+)<", text).group(1))

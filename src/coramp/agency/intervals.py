@@ -128,15 +128,15 @@ def delay_by_interval_s(motion: Motion, edges_s: FloatArray) -> FloatArray:
     for k, edge_s in enumerate(edges_s):
         then_s = np.minimum(edge_s, motion.until_s)
         lost_s[:, k] = np.maximum(0.0, then_s - motion.scheduled_s)
-        here = np.flatnonzero(ever & (motion.entry_s < then_s))
+        gone = motion.exit_s <= edge_s
+        lost_s[gone, k] -= motion.free_flow_s[gone]
+        here = np.flatnonzero(ever & ~gone & (motion.entry_s < then_s))
         _, station_m = states_at(motion, here, then_s[here])
         for vehicle, at_m in zip(here.tolist(), station_m.tolist(), strict=True):
-            if motion.exit_s[vehicle] <= edge_s:
-                free_s = float(motion.free_flow_s[vehicle])
-            else:
-                on_ramp = bool(motion.on_ramp[vehicle])
-                free_s = free_time_to_s(at_m, motion.traits[vehicle], on_ramp, packed_rules)
-            lost_s[vehicle, k] -= free_s
+            on_ramp = bool(motion.on_ramp[vehicle])
+            lost_s[vehicle, k] -= free_time_to_s(
+                at_m, motion.traits[vehicle], on_ramp, packed_rules
+            )
     return np.diff(lost_s, axis=1)
 
 

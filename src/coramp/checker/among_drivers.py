@@ -167,6 +167,8 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     """Where an automated vehicle has come in before a driver, nearer than he brakes for in comfort.
 
     He has driven on for a step, and he may have sped up in it. While he moves he has s_0 at least.
+    A driver who comes in behind it in the same step has followed it on the ramp, and judges his gap
+    himself.
     """
     own, rear = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
     share = np.maximum(0.0, seen.station_m[pairs.front] / limits.lane_end_m)
@@ -176,7 +178,8 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     near_m = np.minimum(limits.driver_gap_m, STANDING_M + limits.driver_gap_s * rear)
     needs_m = np.maximum(needs_m, near_m)
     automated = seen.automated[seen.vehicle]
-    found = came_in[pairs.front] & automated[pairs.front] & ~automated[pairs.rear]
+    found = came_in[pairs.front] & automated[pairs.front]
+    found &= ~automated[pairs.rear] & ~came_in[pairs.rear]
     return np.asarray(found & (pairs.gap_m < needs_m - 2.0 * EXACT_M))
 
 

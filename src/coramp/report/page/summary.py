@@ -104,24 +104,26 @@ def _words(pairs: Pairs, found: Sequence[Change]) -> Iterator[str]:
     names = [title_of(measured.run) for measured in pairs[0]]
     yield _asked(pairs[0][0], len(pairs))
     yield f"Before: {names[0]}. After: {names[1]}. Both meet the same vehicles at the same times."
-    yield _compared(by["time_spent_h"], "All vehicles together spend", "hours")
+    yield compared_words(by["time_spent_h"], "All vehicles together spend", "hours")
     for stream in ("mainline", "ramp"):
         if f"{stream}_delay_s" in by:
-            yield _compared(by[f"{stream}_delay_s"], f"On the {stream} they lose", "s on average")
+            yield compared_words(
+                by[f"{stream}_delay_s"], f"On the {stream} they lose", "s on average"
+            )
     yield _breakdowns(pairs)
     letters = [sorted({m.letter for m in runs}) for runs in zip(*pairs, strict=True)]
     yield (
         "In its densest 15 minutes the merge works at level of service "
         f"{' to '.join(letters[0])} before and {' to '.join(letters[1])} after."
     )
-    yield _compared(by["co2_kg"], "Vehicles emit", "kg of CO₂")
+    yield compared_words(by["co2_kg"], "Vehicles emit", "kg of CO₂")
     yield _collisions(by["collisions"])
     if len(pairs) == 1:
         yield ONE_SEED
 
 
-def _compared(change: Change, lead: str, unit: str) -> str:
-    """A figure before and after in a sentence, and whether the difference is sure."""
+def compared_words(change: Change, lead: str, unit: str) -> str:
+    """Returns a figure before and after in a sentence, and whether the difference is sure."""
     digits = FIGURES[change.key].digits
     before, after = (number(e.mean, digits) for e in (change.before, change.after))
     text = f"{lead} {after} {unit} after, {before} before"
