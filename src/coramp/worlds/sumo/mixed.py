@@ -94,9 +94,7 @@ def begun(
         laws = laws_of(scenario, drivers, plant.period_s, actuators.delay_s)
         air = Air(scenario, heard, automated, seed)
         acts_after_s = scenario.commands.delay_s + actuators.delay_s
-        control = control_of(
-            plant, strategy, laws, air, acts_after_s, notes=notes_of(options, air)
-        )
+        control = control_of(plant, strategy, laws, air, acts_after_s, notes=notes_of(options, air))
         careless = Careless(scenario, session, seed)
         yield MixedRun(scenario, population, arrivals, files, plant, control, careless)
 

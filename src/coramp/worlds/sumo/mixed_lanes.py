@@ -173,8 +173,8 @@ class LanedControl(Control):
     ) -> list[int]:
         """Which vehicles of the outermost lane change to the lane further in."""
         users, lane = moment.users, self._lane
-        held = users.automated & (lane == OUTERMOST) & (users.station_m < self.laws.safety.lane_end_m)
-        held &= self._beside & np.isfinite(most_mps2)
+        held = users.automated & (lane == OUTERMOST) & self._beside & np.isfinite(most_mps2)
+        held &= users.station_m < self.laws.safety.lane_end_m
         beside = around.rear[merging]
         held[beside[beside >= 0]] = False  # one thing at a time: its new leader comes in now
         if not (held & (most_mps2 < 0.0)).any():
