@@ -35,6 +35,10 @@ class LanedPlant(MixedPlant):
     beside: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
     _sumo_lane: dict[str, int] = field(default_factory=dict)
 
+    def is_on(self, road: LanedRoad) -> None:
+        """Is told its road."""
+        self.road = road
+
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who may leave the acceleration lane, and all that is on the road."""
         assert self.road is not None
@@ -101,6 +105,11 @@ class LanedControl(Control):
     """
 
     plant: LanedPlant | None = None
+
+    def drives(self, plant: MixedPlant) -> None:
+        """Is told whom it drives."""
+        assert isinstance(plant, LanedPlant)
+        self.plant = plant
 
     def decided(self, now_s: float, names: list[str], able: BoolArray, users: RoadUsers) -> Moment:
         """Returns what the strategy answers to what it has heard of the outer lanes."""
