@@ -13,6 +13,7 @@ import tomli_w
 from coramp.errors import CorampError
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
+from coramp.records.files import write_text
 from coramp.scenarios.defaults import with_defaults, with_populations
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.network_section import sha256_of
@@ -30,23 +31,26 @@ OSM_OPTIONS = (
 """What SUMO's documentation recommends for networks of OpenStreetMap with motorways."""
 
 
-def new_scenario_text(name: str, network: Path, ramp_id: str, beside: Path) -> str:
+def new_scenario_text(
+    name: str, network: Path, lies_in: Path, ramp_id: str | None, beside: Path
+) -> str:
     """Returns the TOML text of a scenario of an on-ramp; paths count from the folder ``beside``.
 
-    Raises CorampError where there is no such ramp, or coramp cannot drive there.
+    ``network`` is read, and is to be where ``lies_in`` says. Raises CorampError where there is no
+    such ramp, or coramp cannot drive there.
     """
     found = on_ramps(read_network(network))
     try:
-        site = found.named(ramp_id)
+        site = found.only() if ramp_id is None else found.named(ramp_id)
     except CorampError as error:
-        raise CorampError(f"{network}: {error}") from error
+        raise CorampError(f"{lies_in}: {error}") from error
     if reason := reason_against(site):
-        raise CorampError(f"{network}: {ramp_id} cannot be coordinated: {reason}")
+        raise CorampError(f"{lies_in}: {site.ramp_id} cannot be coordinated: {reason}")
     data: dict[str, Any] = {"name": name, **scenario_data(site)}
     data["network"] = {
-        "file": _path_from(network, beside),
+        "file": _path_from(lies_in, beside),
         "sha256": sha256_of(network),
-        "ramp": ramp_id,
+        "ramp": site.ramp_id,
     }
     lanes = data["mainline"]["lanes"]
     data["mainline"]["flow_veh_h"] = MODERATE_LANE_VEH_H * lanes
@@ -65,34 +69,39 @@ def _path_from(network: Path, beside: Path) -> str:
     return str(whole.relative_to(folder)) if whole.is_relative_to(folder) else str(whole)
 
 
-def osm_network_beside(osm: Path, scenario: Path) -> Path:
-    """Returns the network that netconvert makes beside a scenario; an earlier one is refused."""
-    target = scenario.with_name(f"{scenario.stem}.net.xml")
-    if target.exists():
-        raise CorampError(f"{target}: is there already; use it by --net, or give another name")
-    network_of_osm(osm, target)
-    return target
+def write_new_scenario(target: Path, network: Path, ramp_id: str | None) -> None:
+    """Writes the scenario of an on-ramp of a network, the only one where no id is given."""
+    write_text(target, new_scenario_text(target.stem, network, network, ramp_id, target.parent))
 
 
-def network_of_osm(osm: Path, target: Path) -> None:
-    """Writes the network of a file of OpenStreetMap, and the command that made it beside it.
+def write_new_scenario_of_osm(target: Path, osm: Path, ramp_id: str | None) -> None:
+    """Writes a scenario, and beside it the network that netconvert makes of an OSM file.
 
-    Raises CorampError where netconvert fails; then nothing is written.
+    The command is kept as well. Raises CorampError where netconvert fails, or there is no such
+    on-ramp; then nothing is written.
     """
+    network = target.with_name(f"{target.stem}.net.xml")
+    if network.exists():
+        raise CorampError(f"{network}: is there already; use it by --net, or give another name")
     if not osm.is_file():
         raise CorampError(f"--osm: {osm}: no such file; allowed is an extract of OpenStreetMap")
-    command = ["netconvert", "--osm-files", str(osm), *OSM_OPTIONS]
-    command += ["--output-file", str(target)]
+    command = ["netconvert", "--osm-files", str(osm), *OSM_OPTIONS, "--output-file"]
     with tempfile.TemporaryDirectory(prefix="coramp-osm-") as folder:
-        built = Path(folder) / target.name
-        run = [str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"), *command[1:-1], str(built)]
-        environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-        done = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
-        if done.returncode != 0 or not built.exists():
-            told = [line for line in done.stderr.splitlines() if line.startswith("Error")]
-            raise CorampError(f"--osm: {osm}: netconvert: {(told or ['failed'])[0]}")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(built, target)
-    target.with_name(target.name.removesuffix(".net.xml") + ".netconvert.txt").write_text(
-        " ".join(command) + "\n", encoding="utf-8"
+        built = Path(folder) / network.name
+        _convert([*command, str(built)], osm, built)
+        text = new_scenario_text(target.stem, built, network, ramp_id, target.parent)
+        shutil.move(built, network)
+    told = target.with_name(f"{target.stem}.netconvert.txt")
+    write_text(told, " ".join([*command, str(network)]) + "\n")
+    write_text(target, text)
+
+
+def _convert(command: list[str], osm: Path, built: Path) -> None:
+    program = str(Path(sumo.SUMO_HOME) / "bin" / command[0])
+    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
+    done = subprocess.run(
+        [program, *command[1:]], capture_output=True, text=True, env=environment, check=False
     )
+    if done.returncode != 0 or not built.exists():
+        told = [line for line in done.stderr.splitlines() if line.startswith("Error")]
+        raise CorampError(f"--osm: {osm}: netconvert: {(told or ['failed'])[0]}")
