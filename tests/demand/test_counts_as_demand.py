@@ -226,3 +226,12 @@ def test_counts_tells_what_does_not_add_up(here):
     assert invoke("counts", "c.csv", "--repair").code == 0
     assert_refused(invoke("counts", "none.csv"))
     assert_refused(invoke("counts", "c.csv", "--downstream", "M"))
+
+
+def test_a_scenario_with_counts_is_printed_as_it_is_taken(here):
+    assert new().code == 0
+    lines = invoke("scenarios", "s.toml").out.splitlines()
+    assert "# horizon_s = 900.0  # follows from the end of the demand" in lines
+    assert "# [[vehicle]]: car, truck, listed in the file" in lines
+    assert "# [[detector]]: M, R, listed in the file" in lines
+    assert any(line.startswith("# [counts]: c.csv, at M and ") for line in lines)

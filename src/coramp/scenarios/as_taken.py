@@ -58,7 +58,8 @@ def taken(name: str) -> tuple[Scenario, list[Taken]]:
 
 
 def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
-    for table in TABLES:
+    listed = isinstance(scenario.vehicle, tuple)  # types of vehicles stand in the file
+    for table in (name for name in TABLES if not (listed and name == "vehicle")):
         given = data.get(table, {})
         model = getattr(scenario, table)
         for key, field in type(model).model_fields.items():
@@ -73,13 +74,18 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
                 value, why = scenario.traffic.share_of(key == SHARES[1]), _from(f"traffic.{key}")
             elif value is None:
                 continue
-            elif key == "flow_veh_h":
-                why = "of the demand" if scenario.demand else "of the list of arrivals"
-            elif f"{table}.{key}" == HORIZON and scenario.demand:
-                why = f"{FOLLOWS} the end of the demand"
             else:
-                why = _from(f"{table}.{key}") if field.is_required() else DEFAULT
+                why = _why_otherwise(scenario, f"{table}.{key}", field.is_required())
             yield Taken(f"{table}.{key}", value, why)
+
+
+def _why_otherwise(scenario: Scenario, key: str, is_required: bool) -> str:
+    """Why a key that the file leaves out has its value, where no other key decides it."""
+    if key.endswith(".flow_veh_h"):
+        return "of the demand" if scenario.demand else "of the list of arrivals"
+    if key == HORIZON and scenario.demand:
+        return f"{FOLLOWS} the end of the demand"
+    return _from(key) if is_required else DEFAULT
 
 
 def _keys_of_world(
@@ -151,7 +157,10 @@ def as_toml(name: str) -> str:
 
 
 def _demand_and_detectors(scenario: Scenario) -> Iterator[str]:
-    """What there is of tables that are lists, or refer to a file."""
+    """What there is of tables that are lists, or refer to a file, in comments."""
+    if isinstance(scenario.vehicle, tuple):
+        names = ", ".join(kind.name for kind in scenario.vehicle_types)
+        yield f"# [[vehicle]]: {names}, listed in the file"
     if scenario.counts is not None:
         yield f"# [counts]: {scenario.counts.file}, at {scenario.counts.mainline} and "
         yield f"#   {scenario.counts.ramp}, which amounts to the flows above"
