@@ -170,7 +170,7 @@ def test_detectors_that_are_not_there(here):
     told = invoke("new-scenario", "s", "--mainline-detector", "M")
     assert told.errors == ["Error: --mainline-detector: without --counts; give a file of counts"]
     assert invoke("new-scenario", "s").errors == [
-        "Error: --net, --osm, --counts: none is given; allowed is one at least"
+        "Error: --net, --osm: allowed is one of them, or --counts alone; none is given"
     ]
 
 

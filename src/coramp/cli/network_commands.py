@@ -67,7 +67,8 @@ def ramps(
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
     ramp: Annotated[
-        str | None, typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it.")
+        str | None,
+        typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it (default: the one)."),
     ] = None,
     net: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
@@ -113,9 +114,7 @@ def new_scenario(
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
-    from coramp.cli.new_scenario import Asked, content_of
-    from coramp.records.files import write_text
-    from coramp.scenarios.new_scenario import new_scenario_text
+    from coramp.cli.new_scenario import Asked, write_asked
 
     target = Path(f"{name}.toml")
     if target.exists():
@@ -124,9 +123,7 @@ def new_scenario(
         *(ramp, net, osm, road, counts, mainline_detector, ramp_detector),
         *(detector or [], classes or [], repair),
     )
-    content, repairs = content_of(asked, target)
-    write_text(target, new_scenario_text(content, target))
-    for line in repairs:
+    for line in write_asked(asked, target):
         print(f"Repaired: {line}", file=sys.stderr)
-    strategy = " --strategy mixed-slots" if "network" in content else ""
+    strategy = " --strategy mixed-slots" if net is not None or osm is not None else ""
     print(f"Written: {target}; now coramp run {target}{strategy}")

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from coramp.errors import CorampError
+from coramp.records.files import write_text
 from coramp.scenarios.counted import (
     CountsChoice,
     classes_of,
@@ -11,7 +12,11 @@ from coramp.scenarios.counted import (
     stations_of,
     with_counts_tables,
 )
-from coramp.scenarios.new_scenario import new_scenario_data, osm_network_beside
+from coramp.scenarios.new_scenario import (
+    new_scenario_text,
+    write_new_scenario,
+    write_new_scenario_of_osm,
+)
 
 ROAD = "paper"
 """The scenario whose road one with counts has where nothing is said."""
@@ -32,35 +37,41 @@ class Asked(NamedTuple):
     repair: bool
 
 
-def content_of(asked: Asked, target: Path) -> tuple[dict[str, Any], list[str]]:
-    """Returns the content of the scenario for a file, and a line for each repair of its counts.
+def write_asked(asked: Asked, target: Path) -> list[str]:
+    """Writes the scenario that was asked for; returns a line for each repair of its counts.
 
     Raises CorampError for options that do not go together, and for what they name and is not there.
     """
     choice = _choice(asked)
-    data = _road(asked, target)
-    if choice is None:
-        return data, []
-    data, repairs = with_counts_tables(data, choice, target.parent)
-    return data, [repair.line(str(choice.file)) for repair in repairs]
+    told: list[str] = []
+
+    def counted(data: dict[str, Any]) -> dict[str, Any]:
+        if choice is None:
+            return data
+        result, repairs = with_counts_tables(data, choice, target.parent)
+        told.extend(repair.line(str(choice.file)) for repair in repairs)
+        return result
+
+    _check_road(asked)
+    if asked.net is not None:
+        write_new_scenario(target, asked.net, asked.ramp, counted)
+    elif asked.osm is not None:
+        write_new_scenario_of_osm(target, asked.osm, asked.ramp, counted)
+    else:
+        write_text(target, new_scenario_text(counted(road_of(asked.road or ROAD)), target))
+    return told
 
 
-def _road(asked: Asked, target: Path) -> dict[str, Any]:
-    networks = [file for file in (asked.net, asked.osm) if file is not None]
-    if len(networks) > 1:
+def _check_road(asked: Asked) -> None:
+    if asked.net is not None and asked.osm is not None:
         raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
-    if not networks:
-        if asked.counts is None:
-            raise CorampError("--net, --osm, --counts: none is given; allowed is one at least")
-        if asked.ramp is not None:
-            raise CorampError("--ramp: is an on-ramp of a network; allowed with --net or --osm")
-        return road_of(asked.road or ROAD)
-    if asked.road is not None:
+    in_network = asked.net is not None or asked.osm is not None
+    if not in_network and asked.counts is None:
+        raise CorampError("--net, --osm: allowed is one of them, or --counts alone; none is given")
+    if not in_network and asked.ramp is not None:
+        raise CorampError("--ramp: is an on-ramp of a network; allowed with --net or --osm")
+    if in_network and asked.road is not None:
         raise CorampError("--road: beside a network; allowed is one of them")
-    if asked.ramp is None:
-        raise CorampError("--ramp: is missing; give an id that coramp ramps lists")
-    net = asked.net or osm_network_beside(networks[0], target)
-    return new_scenario_data(net, asked.ramp, target.parent)
 
 
 def _choice(asked: Asked) -> CountsChoice | None:
