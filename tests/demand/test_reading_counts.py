@@ -162,7 +162,7 @@ def test_a_long_flow_keeps_its_number(file):
         (
             3,
             "300,600,M,x,car,12,24",
-            "row 5: lane is 'x'; allowed are 0 (the rightmost), 1, 2 and so on",
+            "row 5: lane is 'x'; allowed are 0 (the rightmost) to 9",
         ),
         (
             3,
@@ -397,3 +397,15 @@ def test_no_counts_at_all(file, content):
 
 def test_no_file(tmp_path):
     assert told(tmp_path / "none.csv")[0].startswith("cannot be read: No such file")
+
+
+def test_a_row_that_lies_years_away_is_one_gap(file):
+    rows = ["0,300,M,0,car,1,20", "300,600,M,0,car,1,20", "3e15,3000000000000300,M,0,car,1,20"]
+    assert told(file(table(*rows))) == [
+        "row 4: no detector has a row from 600 to 3e+15 s; allowed are files without gaps"
+    ]
+
+
+def test_more_than_a_lane_carries_even_in_a_short_last_interval(file):
+    rows = ["0,300,M,0,car,1,20", "300,330,M,0,car,99999999999999999999,20"]
+    assert told(file(table(*rows)), repair=True)[0].startswith("row 3: 1e+20 vehicles in 30 s")

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from coramp.agency.figures import FIGURES
 from coramp.agency.schemas import AGENCY
 from coramp.cli.ramp_listing import ramp_rows
+from coramp.demand import counts
 from coramp.messages import kinds
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
@@ -65,6 +66,7 @@ FILES = {
     "messages.parquet": kinds.COLUMNS,
     **{f"{name}.csv": columns for name, columns in AGENCY.items()},
     "coramp compare --json": FIGURES,
+    "detectors.csv": counts.SCHEMA,
 }
 RAMPS = "coramp ramps --json"
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}

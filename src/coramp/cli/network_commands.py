@@ -60,7 +60,9 @@ def ramps(
 @networks.command(
     "new-scenario",
     epilog="Example: coramp new-scenario a10 --net osm.net.xml --ramp 24498409@4054057\n\n"
-    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057",
+    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057\n\n"
+    "Example: coramp new-scenario morning --counts morning.csv --mainline-detector M "
+    "--ramp-detector R --detector M=-350 --detector R=-300",
 )
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
@@ -75,20 +77,53 @@ def new_scenario(
         Path | None,
         typer.Option(metavar="FILE", help="An extract of OpenStreetMap, for netconvert."),
     ] = None,
+    road: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENARIO",
+            help="With --counts: the road of this scenario (default: paper) instead of a network.",
+        ),
+    ] = None,
+    counts: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Demand as counted; coramp counts shows such a file."),
+    ] = None,
+    mainline_detector: Annotated[
+        str | None, typer.Option(metavar="ID", help="The detector of the mainline in --counts.")
+    ] = None,
+    ramp_detector: Annotated[
+        str | None, typer.Option(metavar="ID", help="The detector of the ramp in --counts.")
+    ] = None,
+    detector: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ID=STATION",
+            help="Where a detector is, in m from the nose (default: 50 m behind the entry); one "
+            "of another name is a further one on the mainline.",
+        ),
+    ] = None,
+    classes: Annotated[
+        list[str] | None,
+        typer.Option("--class", metavar="CLASS=TYPE", help="Of which type a class in --counts is."),
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option(help="Mend what does not add up in --counts, and list it.")
+    ] = False,
 ) -> None:
-    """Write a scenario of an on-ramp in a SUMO network.
+    """Write a scenario of an on-ramp in a SUMO network, or with demand as counted, or both.
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
-    from coramp.cli.new_scenario import write_new_scenario, write_new_scenario_of_osm
+    from coramp.cli.new_scenario import Asked, write_asked
 
     target = Path(f"{name}.toml")
     if target.exists():
         raise CorampError(f"{target}: is there already; give another name, or move it away")
-    if net is not None and osm is None:
-        write_new_scenario(target, net, ramp)
-    elif osm is not None and net is None:
-        write_new_scenario_of_osm(target, osm, ramp)
-    else:
-        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
-    print(f"Written: {target}; now coramp run {target} --strategy mixed-slots")
+    asked = Asked(
+        *(ramp, net, osm, road, counts, mainline_detector, ramp_detector),
+        *(detector or [], classes or [], repair),
+    )
+    for line in write_asked(asked, target):
+        print(f"Repaired: {line}", file=sys.stderr)
+    strategy = " --strategy mixed-slots" if net is not None or osm is not None else ""
+    print(f"Written: {target}; now coramp run {target}{strategy}")

@@ -1,107 +1,98 @@
-"""Writing a scenario of a merge site in a SUMO network, and networks of OpenStreetMap's files."""
+"""What ``coramp new-scenario`` was asked for, as the content of a scenario."""
 
-import os
-import shutil
-import subprocess
-import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import sumo
-import tomli_w
-
-from coramp.errors import CorampError
-from coramp.networks.net_file import read_network
-from coramp.networks.ramps import on_ramps
-from coramp.records.files import write_text
-from coramp.scenarios.defaults import with_defaults, with_populations
-from coramp.scenarios.model import Scenario
-from coramp.scenarios.network_section import sha256_of
-from coramp.scenarios.of_ramp import reason_against, scenario_data
-from coramp.scenarios.toml_files import validated
-
-MODERATE_LANE_VEH_H, MODERATE_RAMP_VEH_H = 1000.0, 300.0
-"""Moderate traffic, with which a new scenario begins."""
-OSM_OPTIONS = (
-    "--geometry.remove",
-    *("--ramps.guess", "--junctions.join"),
-    *("--roundabouts.guess", "--tls.guess-signals", "--tls.discard-simple", "--tls.join"),
-    *("--remove-edges.isolated", "--no-turnarounds"),
+from coramp.cli.scenario_files import (
+    new_scenario_text,
+    write_new_scenario,
+    write_new_scenario_of_osm,
 )
-"""What SUMO's documentation recommends for networks of OpenStreetMap with motorways."""
+from coramp.errors import CorampError
+from coramp.records.files import write_text
+from coramp.scenarios.counted import (
+    CountsChoice,
+    classes_of,
+    road_of,
+    stations_of,
+    with_counts_tables,
+)
+
+ROAD = "paper"
+"""The scenario whose road one with counts has where nothing is said."""
 
 
-def new_scenario_text(
-    name: str, network: Path, lies_in: Path, ramp_id: str | None, beside: Path
-) -> str:
-    """Returns the TOML text of a scenario of an on-ramp; paths count from the folder ``beside``.
+class Asked(NamedTuple):
+    """The options of the command; None where one is left out."""
 
-    ``network`` is read, and is to be where ``lies_in`` says. Raises CorampError where there is no
-    such ramp, or coramp cannot drive there.
+    ramp: str | None
+    net: Path | None
+    osm: Path | None
+    road: str | None
+    counts: Path | None
+    mainline_detector: str | None
+    ramp_detector: str | None
+    detector: list[str]
+    classes: list[str]
+    repair: bool
+
+
+def write_asked(asked: Asked, target: Path) -> list[str]:
+    """Writes the scenario that was asked for; returns a line for each repair of its counts.
+
+    Raises CorampError for options that do not go together, and for what they name and is not there.
     """
-    found = on_ramps(read_network(network))
-    try:
-        site = found.only() if ramp_id is None else found.named(ramp_id)
-    except CorampError as error:
-        raise CorampError(f"{lies_in}: {error}") from error
-    if reason := reason_against(site):
-        raise CorampError(f"{lies_in}: {site.ramp_id} cannot be coordinated: {reason}")
-    data: dict[str, Any] = {"name": name, **scenario_data(site)}
-    data["network"] = {
-        "file": _path_from(lies_in, beside),
-        "sha256": sha256_of(network),
-        "ramp": site.ramp_id,
+    choice = _choice(asked)
+    told: list[str] = []
+
+    def counted(data: dict[str, Any]) -> dict[str, Any]:
+        if choice is None:
+            return data
+        result, repairs = with_counts_tables(data, choice, target.parent)
+        told.extend(repair.line(str(choice.file)) for repair in repairs)
+        return result
+
+    _check_road(asked)
+    if asked.net is not None:
+        write_new_scenario(target, asked.net, asked.ramp, counted)
+    elif asked.osm is not None:
+        write_new_scenario_of_osm(target, asked.osm, asked.ramp, counted)
+    else:
+        write_text(target, new_scenario_text(counted(road_of(asked.road or ROAD)), target))
+    return told
+
+
+def _check_road(asked: Asked) -> None:
+    if asked.net is not None and asked.osm is not None:
+        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
+    in_network = asked.net is not None or asked.osm is not None
+    if not in_network and asked.counts is None:
+        raise CorampError("--net, --osm: allowed is one of them, or --counts alone; none is given")
+    if not in_network and asked.ramp is not None:
+        raise CorampError("--ramp: is an on-ramp of a network; allowed with --net or --osm")
+    if in_network and asked.road is not None:
+        raise CorampError("--road: beside a network; allowed is one of them")
+
+
+def _choice(asked: Asked) -> CountsChoice | None:
+    of_counts = {
+        "--mainline-detector": asked.mainline_detector,
+        "--ramp-detector": asked.ramp_detector,
     }
-    lanes = data["mainline"]["lanes"]
-    data["mainline"]["flow_veh_h"] = MODERATE_LANE_VEH_H * lanes
-    data["ramp"]["flow_veh_h"] = MODERATE_RAMP_VEH_H
-    validated(Scenario, with_defaults(with_populations(data), name), name)
-    ordered = {key: data[key] for key in ("name", "description", "network", "mainline", "ramp")}
-    return f"# {HEAD}\n{tomli_w.dumps(ordered)}"
-
-
-HEAD = "Lengths, lanes and limits are those of the network; set the flows and what else you need."
-
-
-def _path_from(network: Path, beside: Path) -> str:
-    """The path of a network from a folder where it lies inside, else the whole path."""
-    whole, folder = network.absolute(), beside.absolute()
-    return str(whole.relative_to(folder)) if whole.is_relative_to(folder) else str(whole)
-
-
-def write_new_scenario(target: Path, network: Path, ramp_id: str | None) -> None:
-    """Writes the scenario of an on-ramp of a network, the only one where no id is given."""
-    write_text(target, new_scenario_text(target.stem, network, network, ramp_id, target.parent))
-
-
-def write_new_scenario_of_osm(target: Path, osm: Path, ramp_id: str | None) -> None:
-    """Writes a scenario, and beside it the network that netconvert makes of an OSM file.
-
-    The command is kept as well. Raises CorampError where netconvert fails, or there is no such
-    on-ramp; then nothing is written.
-    """
-    network = target.with_name(f"{target.stem}.net.xml")
-    if network.exists():
-        raise CorampError(f"{network}: is there already; use it by --net, or give another name")
-    if not osm.is_file():
-        raise CorampError(f"--osm: {osm}: no such file; allowed is an extract of OpenStreetMap")
-    command = ["netconvert", "--osm-files", str(osm), *OSM_OPTIONS, "--output-file"]
-    with tempfile.TemporaryDirectory(prefix="coramp-osm-") as folder:
-        built = Path(folder) / network.name
-        _convert([*command, str(built)], osm, built)
-        text = new_scenario_text(target.stem, built, network, ramp_id, target.parent)
-        shutil.move(built, network)
-    told = target.with_name(f"{target.stem}.netconvert.txt")
-    write_text(told, " ".join([*command, str(network)]) + "\n")
-    write_text(target, text)
-
-
-def _convert(command: list[str], osm: Path, built: Path) -> None:
-    program = str(Path(sumo.SUMO_HOME) / "bin" / command[0])
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    done = subprocess.run(
-        [program, *command[1:]], capture_output=True, text=True, env=environment, check=False
+    if asked.counts is None:
+        others = {"--detector": asked.detector, "--class": asked.classes, "--repair": asked.repair}
+        if given := [option for option, value in {**of_counts, **others}.items() if value]:
+            raise CorampError(f"{', '.join(given)}: without --counts; give a file of counts")
+        return None
+    if missing := [option for option, value in of_counts.items() if value is None]:
+        raise CorampError(
+            f"{', '.join(missing)}: is missing; give the id of a detector that coramp counts lists"
+        )
+    return CountsChoice(
+        asked.counts,
+        asked.mainline_detector or "",
+        asked.ramp_detector or "",
+        stations_of(asked.detector),
+        classes_of(asked.classes),
+        asked.repair,
     )
-    if done.returncode != 0 or not built.exists():
-        told = [line for line in done.stderr.splitlines() if line.startswith("Error")]
-        raise CorampError(f"--osm: {osm}: netconvert: {(told or ['failed'])[0]}")

@@ -144,7 +144,7 @@ def _capacity(lines: list[Line], findings: Findings, lanes: int | None) -> list[
         length_s = first.end_s - first.begin_s
         count = sum(line.vehicles for line in here)
         many = 1 if first.lane is not None else lanes or MOST_LANES
-        if length_s < SHORTEST_S - SAME_S or count * HOUR_S <= many * CAPACITY_VEH_H * length_s:
+        if count * HOUR_S <= many * CAPACITY_VEH_H * max(length_s, SHORTEST_S):
             continue
         row = max(here, key=lambda line: line.vehicles).row
         per = "a lane" if many == 1 else f"on {many} lanes"

@@ -58,6 +58,11 @@ def _one_after_another(
             what = f"begins at {begin:g} s, which is no multiple of {length_s:g} s after {end:g} s"
             findings.tell(row, what, "are intervals that follow on each other")
             return False
+        if begin - end > LONGEST_GAP_S + SAME_S:
+            row = min(line.row for line in lines if line.begin_s == begin)
+            what = f"no detector has a row from {end:g} to {begin:g} s"
+            findings.tell(row, what, "are files without gaps")
+            return False
         missing += [(end + k * length_s, end + (k + 1) * length_s) for k in range(count)]
     intervals += missing
     intervals.sort()

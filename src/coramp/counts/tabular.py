@@ -28,6 +28,7 @@ COLUMNS = (BEGIN, END, DETECTOR, LANE, CLASS, VEHICLES, PER_HOUR, SPEED_MPS, SPE
 NAMES = "are the columns time or begin_s, end_s, detector or edge, lane, class, vehicles or "
 NAMES += "flow_veh_h, mean_speed_mps or mean_speed_kmh"
 DFROUTER = ("detector", "time", "qpkw")
+MOST_LANE = 9
 KMH = 3.6
 PER_MINUTE = 60.0
 SECONDS_PER_HOUR = 3600.0
@@ -118,7 +119,7 @@ class _Raw:
         word = self.word(LANE)
         if word in ("", "None", "null"):
             return None
-        return int(word) if word.isdecimal() else -1
+        return int(word) if word.isdecimal() and int(word) <= MOST_LANE else -1
 
     def as_line(self, begin_s: float, end_s: float) -> Line:
         """Returns the line, with numbers as they are."""
@@ -127,7 +128,7 @@ class _Raw:
         lane = self.lane
         if lane == -1:
             what = f"lane is {self.word(LANE)!r}"
-            self._findings.tell(self.number, what, "are 0 (the rightmost), 1, 2 and so on")
+            self._findings.tell(self.number, what, f"are 0 (the rightmost) to {MOST_LANE}")
         if self.has(PER_HOUR):
             flow = self.number_of(PER_HOUR)
             vehicles = flow * (end_s - begin_s) / SECONDS_PER_HOUR

@@ -15,6 +15,7 @@ from coramp.scenarios.world_sections import TABLES as OF_THE_WORLD
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
 TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation", "traffic")
+HORIZON = "simulation.horizon_s"
 NETWORK = "network"
 SHARES = ("mainline_automated_share", "ramp_automated_share")
 FOLLOWS, DEFAULT = "follows from", "default"
@@ -59,7 +60,9 @@ def taken(name: str) -> tuple[Scenario, list[Taken]]:
 
 
 def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
-    for table in TABLES if scenario.network is None else (NETWORK, *TABLES):
+    tables = TABLES if scenario.network is None else (NETWORK, *TABLES)
+    listed = isinstance(scenario.vehicle, tuple)  # types of vehicles stand in the file
+    for table in (name for name in tables if not (listed and name == "vehicle")):
         given = data.get(table, {})
         model = getattr(scenario, table)
         for key, field in type(model).model_fields.items():
@@ -74,11 +77,18 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
                 value, why = scenario.traffic.share_of(key == SHARES[1]), _from(f"traffic.{key}")
             elif value is None:
                 continue
-            elif key == "flow_veh_h":
-                why = "of the list of arrivals"
             else:
-                why = _from(f"{table}.{key}") if field.is_required() else DEFAULT
+                why = _why_otherwise(scenario, f"{table}.{key}", field.is_required())
             yield Taken(f"{table}.{key}", value, why)
+
+
+def _why_otherwise(scenario: Scenario, key: str, is_required: bool) -> str:
+    """Why a key that the file leaves out has its value, where no other key decides it."""
+    if key.endswith(".flow_veh_h"):
+        return "of the demand" if scenario.demand else "of the list of arrivals"
+    if key == HORIZON and scenario.demand:
+        return f"{FOLLOWS} the end of the demand"
+    return _from(key) if is_required else DEFAULT
 
 
 def _keys_of_world(
@@ -133,7 +143,8 @@ def as_toml(name: str) -> str:
             lines += ["", f"[{table}]"]
         notes = [note for note in (_in_kmh(plain, value), why) if note]
         follows = why is not None and why.startswith(FOLLOWS)
-        commented = "# " if follows or (plain == "flow_veh_h" and scenario.arrivals) else ""
+        listed = plain == "flow_veh_h" and (scenario.arrivals or scenario.demand)
+        commented = "# " if follows or listed else ""
         comment = f"  # {', '.join(notes)}" if notes else ""
         lines.append(f"{commented}{plain} = {_text(value)}{comment}")
     common = [n for n in scenario.drivers if n in populations()]
@@ -144,7 +155,22 @@ def as_toml(name: str) -> str:
         lines.append(f"# drivers of its own: {', '.join(own)}")
     if scenario.arrivals:
         lines.append(f"# [[arrivals]]: {len(scenario.arrivals)} vehicles, listed in the file")
+    lines += _demand_and_detectors(scenario)
     return "\n".join(lines) + "\n"
+
+
+def _demand_and_detectors(scenario: Scenario) -> Iterator[str]:
+    """What there is of tables that are lists, or refer to a file, in comments."""
+    if isinstance(scenario.vehicle, tuple):
+        names = ", ".join(kind.name for kind in scenario.vehicle_types)
+        yield f"# [[vehicle]]: {names}, listed in the file"
+    if scenario.counts is not None:
+        yield f"# [counts]: {scenario.counts.file}, at {scenario.counts.mainline} and "
+        yield f"#   {scenario.counts.ramp}, which amounts to the flows above"
+    elif scenario.demand:
+        yield f"# [[demand]]: {len(scenario.demand)} parts, listed in the file"
+    if scenario.detector:
+        yield f"# [[detector]]: {', '.join(d.id for d in scenario.detector)}, listed in the file"
 
 
 def _in_kmh(key: str, value: Any) -> str:

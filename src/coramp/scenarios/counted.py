@@ -13,6 +13,7 @@ from coramp.errors import CorampError
 from coramp.road.streams import STREAMS
 from coramp.scenarios.listed import FLOWS, LIST
 from coramp.scenarios.measured import COUNTS, DEMAND, DETECTORS, KNOWN_AS, digest_of
+from coramp.scenarios.speeds_kmh import data_in_mps
 from coramp.scenarios.toml_files import read
 from coramp.scenarios.vehicle_types import BUILT_IN
 
@@ -67,7 +68,8 @@ def classes_of(texts: list[str]) -> dict[str, str]:
 
 def road_of(scenario: str) -> dict[str, Any]:
     """Returns the content of a scenario without its demand and its name, for another one."""
-    _, data = read("scenarios", scenario)
+    label, data = read("scenarios", scenario)
+    data, _ = data_in_mps(data, label)
     kept = {key: value for key, value in data.items() if key not in NOT_TAKEN}
     kept["description"] = f"the road of {scenario}"
     return kept
@@ -84,10 +86,8 @@ def with_counts_tables(
     """
     lanes = data["mainline"].get("lanes", 1)
     counts = read_counts(choice.file, choice.repair, lanes)
-    for option, detector in (
-        ("--mainline-detector", choice.mainline),
-        ("--ramp-detector", choice.ramp),
-    ):
+    for stream in STREAMS:
+        option, detector = f"--{stream}-detector", getattr(choice, stream)
         if detector not in counts.detectors:
             known = ", ".join(counts.detectors)
             raise CorampError(

@@ -56,7 +56,7 @@ def with_counts(data: Mapping[str, Any], label: str, origins: Mapping[str, str])
     if source.sha256 not in (None, digest):
         raise CorampError(
             f"{blamed}: counts.sha256: {path} has changed since: its hash is {digest}; "
-            f"allowed is {source.sha256}"
+            f"allowed is {source.sha256}, or a new scenario by coramp new-scenario"
         )
     counts = _read(path, digest, source, _lanes_of(data))
     parts = demand_of(counts, source, _types_of(data), _stations(data), blamed)
