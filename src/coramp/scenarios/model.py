@@ -63,6 +63,8 @@ SLOWER_PER_TIME_GAP_PS = 4.0
 """By how many times ``speed_deviation`` a gap maker may be slower still, a second of time gap."""
 SLOWEST_DEVIATION = 0.5
 """Slower still gains nothing: flows at breakdown are the same, and the mainline loses more."""
+OF_LANES = ("lanes", "lane_shares")
+"""Keys of the mainline that say something where it has several lanes."""
 GRIP_SHARE = 0.95
 """Of the braking that Eq. 3 allows, what stops before the nose use."""
 
@@ -102,11 +104,16 @@ class Scenario(Model):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_used(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A scenario without these tables is written, and hashed, as if there were no such."""
+        """A scenario without these tables is written, and hashed, as if there were no such.
+
+        So is one with one lane.
+        """
         data: dict[str, Any] = handler(self)
-        for name in ("demand", "counts", "detector"):
+        for name in ("network", "demand", "counts", "detector"):
             if not data.get(name):
                 data.pop(name, None)
+        if self.mainline.lanes == 1:
+            data["mainline"] = {k: v for k, v in data["mainline"].items() if k not in OF_LANES}
         return data
 
     @field_validator("strategy", mode="before")
