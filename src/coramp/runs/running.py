@@ -21,6 +21,7 @@ from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_dri
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.population_files import is_population_file, read_population
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
@@ -128,7 +129,8 @@ def make_spec(
 ) -> RunSpec:
     """Returns the specification of a run; raises CorampError for what cannot be run.
 
-    Errors name the options of the command line, or else say ``blamed`` for all of them.
+    ``drivers`` is the name of a population of the scenario, or a file that holds one. Errors name
+    the options of the command line, or else say ``blamed`` for all of them.
     """
     chosen = strategy_named(strategy)
     engine_checked(engine)
@@ -147,7 +149,11 @@ def make_spec(
     blame = {**blame_kmh, **{key: OPTIONS[key] for key in named}}
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
-    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    populations: dict[str, Any] = {}
+    if drivers is not None and is_population_file(drivers):
+        drivers, table = read_population(drivers)
+        populations[drivers] = table
+    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame, populations)
     _check_types(loaded, chosen)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)

@@ -1,0 +1,225 @@
+"""Fits a population of drivers to what detectors at a merge told."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.calibration.fit import Fit, fit_of
+from coramp.calibration.free_speed import FreeSpeed, free_intervals, free_speed
+from coramp.calibration.models import AXES, speed_factor, usual_population
+from coramp.calibration.moments import moments_of, names_of_moments, onset_s
+from coramp.calibration.replayed import Replayed, speed_loops
+from coramp.calibration.search import Axis, Round, search
+from coramp.calibration.series import Series, breakdown_of
+from coramp.calibration.site import Site
+from coramp.errors import CorampError
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import DriverPopulation
+
+BEFORE_S, AFTER_S = 1800.0, 1200.0
+"""How much of the data before and after a breakdown is driven again by candidates."""
+FREE_S = 3600.0
+"""How much of the data before it is driven again for desired speeds."""
+LEAST_BEFORE_S = 600.0
+LEAST_VEHICLES = 100
+"""With fewer vehicles the mean of their speeds is off by 1 % or more."""
+USUAL_DEVIATION = 0.07
+"""Spread of wishes over their mean where the data does not tell it: that of ``credible``."""
+ROUNDS = ((2, 0.5, 0.3), (1, 0.25, 0.2), (1, 0.12, 0.1))
+"""Quarters of the runs, half width and reach of each round."""
+SPEED_SEEDS, FIT_RUNS = 4, 8
+LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
+"""Least noise of the numbers that the search compares, by what their names end in."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is simulated: ``runs`` of the search, through ``seeds`` by turns, ``jobs`` at once.
+
+    ``report`` is told after each run how many of how many are done.
+    """
+
+    runs: int = 96
+    seeds: int = 16
+    jobs: int = 2
+    report: Callable[[int, int], None] = lambda _done, _total: None
+
+    @property
+    def total(self) -> int:
+        """How many runs a calibration takes."""
+        return self.runs + 3 * SPEED_SEEDS + FIT_RUNS
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A population fitted to data; ``fit`` is None where the data shows no breakdown.
+
+    ``notes`` say what the data does not tell.
+    """
+
+    drivers: DriverPopulation
+    free: FreeSpeed
+    fit: Fit | None
+    notes: tuple[str, ...]
+
+
+class Counter:
+    """Counts runs, and tells of each."""
+
+    def __init__(self, effort: Effort) -> None:
+        self._effort, self._done = effort, 0
+
+    def __call__(self) -> None:
+        """One more run is done."""
+        self._done += 1
+        self._effort.report(self._done, self._effort.total)
+
+
+def calibrate_series(
+    scenario: Scenario, site: Site, data: Series, model: str, effort: Effort
+) -> Calibrated:
+    """Returns the population of a model that fits data of detectors best.
+
+    Desired speeds come first, from free traffic; then all that shows in how the merge breaks down;
+    then desired speeds once more. Raises CorampError where data is too little for the first.
+    """
+    rough_mps = _rough_mps(data, site)
+    onset = onset_s(data, site, rough_mps)
+    free = _free_of(data, site, scenario, rough_mps, onset)
+    _check_enough(free)
+    v0 = scenario.mainline.speed_mps
+    notes = []
+    deviation = USUAL_DEVIATION if free.deviation_mps is None else free.deviation_mps / v0
+    if free.deviation_mps is None:
+        notes.append(
+            f"the spread of desired speeds is not told by {free.intervals} intervals; "
+            f"it is taken to be {100 * USUAL_DEVIATION:g} %"
+        )
+    drivers = usual_population(model, speed_factor(free.mean_mps / v0, deviation))
+    start = breakdown_of(data.coarse(), site.upstream.id, rough_mps)
+    broke = start is not None and onset - data.begin_s >= LEAST_BEFORE_S
+    if start is None:
+        notes.append(
+            f"capacity is not identified: detector {site.upstream.id} shows no breakdown (15 min "
+            "at least 25 % below free speed); only desired speeds are fitted"
+        )
+    elif not broke:
+        notes.append(
+            f"capacity is not identified: the breakdown begins {onset - data.begin_s:g} s after "
+            f"the data, allowed is from {LEAST_BEFORE_S:g} s on; only desired speeds are fitted"
+        )
+    free_mps = (free.mean_mps, _free_at(data, site.ramp_entry.id, onset))
+    before = data.between(onset - FREE_S, onset)
+    at_will = Replayed(scenario, site, before, free_mps)
+    done = Counter(effort)
+    for _ in range(2):
+        drivers = _with_speeds(at_will, drivers, effort, done)
+    if not broke:
+        return Calibrated(drivers, free, None, tuple(notes))
+    window = data.between(onset - BEFORE_S, onset + AFTER_S)
+    replayed = Replayed(scenario, site, window, free_mps)
+    drivers = _searched(replayed, drivers, AXES[model], effort, done)
+    drivers = _with_speeds(at_will, drivers, effort, done, with_spread=False)
+    fitted = replayed.many([(drivers, 1 + k) for k in range(FIT_RUNS)], effort.jobs, done)
+    fit = fit_of(fitted, window, site, free.mean_mps)
+    return Calibrated(drivers, free, fit, tuple(notes))
+
+
+def _rough_mps(data: Series, site: Site) -> float:
+    """A free speed to tell queues by: what a fifth of the intervals exceeds."""
+    speeds = data.speed_mps[site.upstream.id]
+    if np.isnan(speeds).all():
+        raise CorampError(f"detector {site.upstream.id}: has no speeds; calibration needs them")
+    return float(np.nanquantile(speeds, 0.8))
+
+
+def _check_enough(free: FreeSpeed) -> None:
+    if free.vehicles < LEAST_VEHICLES:
+        raise CorampError(
+            f"free speed: only {free.vehicles} vehicles passed while traffic was free; "
+            f"calibration needs {LEAST_VEHICLES}"
+        )
+
+
+def _free_of(
+    series: Series, site: Site, scenario: Scenario, free_mps: float, onset: float
+) -> FreeSpeed:
+    when = free_intervals(series, site.upstream.id, site.downstream.id, free_mps, onset)
+    loops = speed_loops(site, scenario.mainline.start_m)
+    return free_speed(series, [loop.id for loop in loops], when)
+
+
+def _free_at(data: Series, detector: str, onset: float) -> float:
+    before = data.between(data.begin_s, onset)
+    speeds = before.speed_mps[detector]
+    if np.isnan(speeds).all():
+        raise CorampError(f"detector {detector}: has no speeds; calibration needs them")
+    return float(np.nanmedian(speeds))
+
+
+def _with_speeds(
+    replayed: Replayed,
+    drivers: DriverPopulation,
+    effort: Effort,
+    done: Counter,
+    with_spread: bool = True,
+) -> DriverPopulation:
+    """Returns drivers whose simulated free speeds are those measured, mean and spread.
+
+    On one lane nobody overtakes, and so measured speeds are lower than desired ones, and differ by
+    platoons. The simulation shows by how much: desired speeds are moved by what it is off.
+    """
+    site, measured, free_mps = replayed.site, replayed.measured, replayed.free_mps[0]
+    ends = site.upstream.id, site.downstream.id
+    when = free_intervals(measured, *ends, free_mps, measured.end_s)
+    names = [loop.id for loop in speed_loops(site, replayed.scenario.mainline.start_m)]
+    wanted = free_speed(measured, names, when)
+    runs = replayed.many([(drivers, 1 + k) for k in range(SPEED_SEEDS)], effort.jobs, done)
+    found = [free_speed(run, names, when) for run in runs]
+    factor = drivers.speed_factor
+    assert factor is not None
+    mean = factor.mean * wanted.mean_mps / float(np.mean([one.mean_mps for one in found]))
+    deviation = factor.deviation
+    spreads = [one.deviation_mps for one in found if one.deviation_mps is not None]
+    if with_spread and wanted.deviation_mps is not None and spreads:
+        ratio = wanted.deviation_mps / max(1e-6, float(np.mean(spreads)))
+        deviation *= min(2.0, max(0.25, ratio))
+    return drivers.model_copy(update={"speed_factor": speed_factor(mean, deviation)})
+
+
+def _searched(
+    replayed: Replayed,
+    drivers: DriverPopulation,
+    axes: Sequence[Axis],
+    effort: Effort,
+    done: Counter,
+) -> DriverPopulation:
+    """Returns drivers with parameters along the axes at which runs are nearest to the data."""
+    site, free_mps = replayed.site, replayed.free_mps[0]
+    made = 0
+
+    def at(place: FloatArray) -> DriverPopulation:
+        shares = zip(axes, place.tolist(), strict=True)
+        values = {axis.name: axis.value(share) for axis, share in shares}
+        return drivers.model_copy(update=values)
+
+    def simulate(places: FloatArray) -> FloatArray:
+        nonlocal made
+        seeds = [1 + (made + k) % effort.seeds for k in range(len(places))]
+        made += len(places)
+        candidates = [(at(place), seed) for place, seed in zip(places, seeds, strict=True)]
+        runs = replayed.many(candidates, effort.jobs, done)
+        return np.array([moments_of(run, site, free_mps) for run in runs])
+
+    floor = [LEAST_NOISE[name.rsplit(" ", 1)[-1]] for name in names_of_moments(site)]
+    rounds = [Round(quarters * effort.runs // 4, *rest) for quarters, *rest in ROUNDS]
+    place, _, _ = search(
+        axes,
+        rounds,
+        simulate,
+        moments_of(replayed.measured, site, free_mps),
+        np.array(floor),
+    )
+    return at(place)
