@@ -1,4 +1,4 @@
-"""Commands that tell what there is in a SUMO network."""
+"""Commands that tell what there is in a SUMO network, and begin a scenario in it."""
 
 import sys
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from coramp.cli.options import Json, Kmh, Wide
+from coramp.errors import CorampError
 
 networks = typer.Typer(rich_markup_mode=None)
 
@@ -54,3 +55,38 @@ def ramps(
         print_table(ramp_table(listed(network, rows), rows, KMH if kmh else MPS), wide)
     else:
         print(listed(network, rows))
+
+
+@networks.command(
+    "new-scenario",
+    epilog="Example: coramp new-scenario a10 --net osm.net.xml --ramp 24498409@4054057\n\n"
+    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057",
+)
+def new_scenario(
+    name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
+    ramp: Annotated[str, typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it.")],
+    net: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
+    ] = None,
+    osm: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="An extract of OpenStreetMap, for netconvert."),
+    ] = None,
+) -> None:
+    """Write a scenario of an on-ramp in a SUMO network.
+
+    With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
+    """
+    from coramp.records.files import write_text
+    from coramp.scenarios.new_scenario import new_scenario_text, osm_network_beside
+
+    if (net is None) == (osm is None):
+        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
+    target = Path(f"{name}.toml")
+    if target.exists():
+        raise CorampError(f"{target}: is there already; give another name, or move it away")
+    if net is None and osm is not None:
+        net = osm_network_beside(osm, target)
+    if net is not None:
+        write_text(target, new_scenario_text(target.stem, net, ramp, target.parent))
+    print(f"Written: {target}; now coramp run {target} --strategy mixed-slots")

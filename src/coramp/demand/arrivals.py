@@ -1,7 +1,6 @@
 """Who arrives when: random headways and entry speeds, the same for every strategy."""
 
 import math
-import zlib
 from collections.abc import Sequence
 from itertools import count
 from operator import itemgetter
@@ -10,18 +9,13 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
+from coramp.demand.generators import generator
+from coramp.demand.measured import drawn_arrivals
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import Mainline, Ramp, Vehicle
 from coramp.scenarios.vehicle_types import VehicleType
 from coramp.vehicles.traits import CAR, Traits
-
-
-def generator(seed: int, purpose: str) -> np.random.Generator:
-    """Returns the random generator of one purpose; another purpose never shifts it."""
-    return np.random.default_rng(
-        np.random.SeedSequence(seed, spawn_key=(zlib.crc32(purpose.encode()),))
-    )
 
 
 def arrival_times_s(
@@ -88,9 +82,14 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
     """
     if scenario.arrivals:
         given = _explicit_arrivals(scenario)
+    elif scenario.demand:
+        given = [
+            *_measured_arrivals(scenario, False, seed),
+            *_measured_arrivals(scenario, True, seed),
+        ]
     else:
         given = [
-            *_stream_arrivals(scenario, False, scenario.mainline, seed),
+            *_mainline_arrivals(scenario, seed),
             *_stream_arrivals(scenario, True, scenario.ramp, seed),
         ]
     numbers = (count(1), count(1))
@@ -104,13 +103,15 @@ def arrivals_of(scenario: Scenario, seed: int) -> list[Arrival]:
             length_m,
             kind,
             traits,
+            lane,
         )
-        for step, on_ramp, mps, length_m, kind, traits in given
+        for step, on_ramp, mps, length_m, kind, traits, lane in given
     ]
 
 
-Unnamed = tuple[int, bool, float, float, str, Traits | None]
-"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m), type, traits."""
+Unnamed = tuple[int, bool, float, float, str, Traits | None, int]
+"""An arrival without its name: step, by the ramp or not, speed (m/s), length (m), type, traits,
+lane."""
 IN_ORDER = itemgetter(0, 1, 2, 3)
 """By time, the mainline first; then by speed and length, where a stream has two at once."""
 
@@ -122,8 +123,15 @@ def _explicit_arrivals(scenario: Scenario) -> list[Unnamed]:
         top_mps = arrival.top_speed_mps or 0.5 * sum(kind.top_speeds_mps)
         step = round(arrival.time_s / scenario.control.step_s)
         rest = _rest(scenario, kind, arrival.speed_mps, top_mps, arrival.length_m)
-        found.append((step, arrival.stream == "ramp", *rest))
+        found.append((step, arrival.stream == "ramp", *rest, arrival.lane))
     return found
+
+
+def _measured_arrivals(scenario: Scenario, on_ramp: bool, seed: int) -> list[Unnamed]:
+    return [
+        (one.step, on_ramp, *_rest(scenario, one.kind, one.speed_mps, one.top_mps), one.lane)
+        for one in drawn_arrivals(scenario, on_ramp, seed)
+    ]
 
 
 def _rest(
@@ -142,29 +150,44 @@ def _rest(
     return min(speed_mps, top_mps), length_m, kind.name, traits
 
 
+def _mainline_arrivals(scenario: Scenario, seed: int) -> list[Unnamed]:
+    """The arrivals of each lane, with the least headway in the lane; each has draws of its own."""
+    mainline, found = scenario.mainline, []
+    for lane, share in enumerate(mainline.shares):
+        to_veh_h = mainline.flow_to_veh_h
+        flows = {
+            "flow_veh_h": share * mainline.flow_veh_h,
+            "flow_to_veh_h": None if to_veh_h is None else share * to_veh_h,
+        }
+        own = mainline.model_copy(update=flows)
+        found += _stream_arrivals(scenario, False, own, seed, lane)
+    return found
+
+
 def _stream_arrivals(
-    scenario: Scenario, on_ramp: bool, stream: Mainline | Ramp, seed: int
+    scenario: Scenario, on_ramp: bool, stream: Mainline | Ramp, seed: int, lane: int = 0
 ) -> list[Unnamed]:
     name, step_s = STREAMS[on_ramp], scenario.control.step_s
+    of_lane = f"{name}/lane {lane}" if lane > 0 else name
     clock = stream.min_headway_s, scenario.simulation.horizon_s, step_s
-    random = generator(seed, f"arrivals/{name}")
+    random = generator(seed, f"arrivals/{of_lane}")
     if stream.flow_to_veh_h is None:
         times_s = arrival_times_s(stream.flow_veh_h, *clock, random)
     else:
         flows_veh_h = stream.flow_veh_h, stream.flow_to_veh_h
         times_s = changing_arrival_times_s(flows_veh_h, *clock, random)
     low_mps, high_mps = stream.entry_speed_mps
-    speeds_mps = generator(seed, f"entry speeds/{name}").uniform(low_mps, high_mps, len(times_s))
+    speeds_mps = generator(seed, f"entry speeds/{of_lane}").uniform(low_mps, high_mps, len(times_s))
     steps = np.rint(times_s / step_s).astype(np.int64)
     if isinstance(scenario.vehicle, Vehicle):
         length_m = scenario.vehicle.length_m
         return [
-            (step, on_ramp, speed_mps, length_m, CAR, None)
+            (step, on_ramp, speed_mps, length_m, CAR, None, lane)
             for step, speed_mps in zip(steps.tolist(), speeds_mps.tolist(), strict=True)
         ]
-    kinds = kinds_of(scenario, on_ramp, len(times_s), seed)
+    kinds = kinds_of(scenario, on_ramp, len(times_s), seed, of_lane)
     return [
-        (step, on_ramp, *_rest(scenario, kind, speed_mps, top_mps))
+        (step, on_ramp, *_rest(scenario, kind, speed_mps, top_mps), lane)
         for step, speed_mps, (kind, top_mps) in zip(
             steps.tolist(), speeds_mps.tolist(), kinds, strict=True
         )
@@ -172,14 +195,16 @@ def _stream_arrivals(
 
 
 def kinds_of(
-    scenario: Scenario, on_ramp: bool, count: int, seed: int
+    scenario: Scenario, on_ramp: bool, count: int, seed: int, of_lane: str | None = None
 ) -> list[tuple[VehicleType, float]]:
     """Returns type and top speed (m/s) of each vehicle of a stream, drawn by the types' shares.
+
+    ``of_lane`` names the draws of a lane other than the outermost.
 
     A vehicle keeps its draws whatever else changes, so that a truck at a share of 10 % is one at
     20 % as well where trucks come last in the list of types.
     """
-    types, name = scenario.vehicle_types, STREAMS[on_ramp]
+    types, name = scenario.vehicle_types, of_lane or STREAMS[on_ramp]
     if len(types) == 1 and math.isinf(types[0].top_speeds_mps[1]):
         return [(types[0], math.inf)] * count
     up_to = np.cumsum([kind.share_of(on_ramp) for kind in types])

@@ -10,7 +10,8 @@ from coramp.vehicles.traits import CAR, Traits
 class RequestToEnter(NamedTuple):
     """A vehicle at the start of its zone asks to enter, from ``step`` on, at this speed.
 
-    ``traits`` is what it can do; None for a vehicle that only the common limits bind.
+    ``traits`` is what it can do; None for a vehicle that only the common limits bind. ``lane`` is
+    that of the mainline, 0 next to the ramp; 0 on the ramp.
     """
 
     vehicle_id: str
@@ -20,6 +21,7 @@ class RequestToEnter(NamedTuple):
     length_m: float
     vehicle_type: str = CAR
     traits: Traits | None = None
+    lane: int = 0
 
 
 class RequestColumns(NamedTuple):
@@ -32,6 +34,7 @@ class RequestColumns(NamedTuple):
     length_m: tuple[float, ...]
     vehicle_type: tuple[str, ...]
     traits: tuple[Traits | None, ...]
+    lane: tuple[int, ...]
 
 
 def columns_of(requests: Sequence[RequestToEnter]) -> RequestColumns:

@@ -18,7 +18,13 @@ SUMO = "sumo"
 """The folder of SUMO's own files in that of a run."""
 SUMO_COPIES = ("routes.rou.xml", "fcd.parquet", "tripinfo.xml", "collisions.xml")
 SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS = "net.net.xml", "command.txt", "loops.add.xml"
-SUMO_FILES = (*SUMO_COPIES, SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS)
+SUMO_DETECTORS, SUMO_DETECTED, DETECTED = "detectors.add.xml", "detectors.xml", "detectors.csv"
+"""The scenario's detectors, what SUMO wrote of them, and the same as counts."""
+SUMO_FILES = (
+    *SUMO_COPIES,
+    *(SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS),
+    *(SUMO_DETECTORS, SUMO_DETECTED, DETECTED),
+)
 """What it may hold."""
 OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in (*TABLES, MESSAGES))})
 NAMED_AT_MOST = 3

@@ -7,6 +7,7 @@ from coramp.equations.gaps import least_acceleration_mps2
 from coramp.equations.ramp_acceleration import lag_m
 from coramp.equations.safe_distance import following_clearance_m, merge_clearance_m
 from coramp.errors import CorampError
+from coramp.scenarios.demand_checks import demand_problems, detector_problems
 from coramp.scenarios.vehicle_checks import vehicle_problems
 from coramp.scenarios.world_checks import world_problems
 from coramp.strategies.parameters import wrong_settings, wrong_together
@@ -15,6 +16,7 @@ from coramp.strategies.registry import strategy_named
 if TYPE_CHECKING:
     from coramp.scenarios.model import Scenario
 
+SHARES_WITHIN = 1e-6
 SHORTEST_EDGE_M = 1.0
 """What SUMO can still build behind the acceleration lane."""
 
@@ -25,13 +27,15 @@ def problems_of(scenario: "Scenario") -> list[str]:
     problems += [*_clock_problems(scenario), *_strategy_problems(scenario)]
     problems += [*_motion_problems(scenario), *_driver_problems(scenario)]
     problems += [*vehicle_problems(scenario), *world_problems(scenario)]
-    return problems or _planning_problems(scenario)
+    problems += [*_lane_problems(scenario), *demand_problems(scenario)]
+    problems += detector_problems(scenario)
+    return problems or (_planning_problems(scenario) if scenario.has_one_lane else [])
 
 
 def _speed_problems(scenario: "Scenario") -> list[str]:
     mainline, ramp = scenario.mainline, scenario.ramp
     problems = []
-    if ramp.speed_mps >= mainline.speed_mps:
+    if ramp.speed_mps >= mainline.speed_mps and scenario.has_one_lane:
         problems.append(
             f"ramp.speed_mps: {ramp.speed_mps:g} is not below mainline.speed_mps; "
             f"the method needs a ramp slower than {mainline.speed_mps:g} m/s"
@@ -90,12 +94,30 @@ def _place_problems(scenario: "Scenario") -> list[str]:
     return problems
 
 
+def _lane_problems(scenario: "Scenario") -> list[str]:
+    """What is wrong with the shares of the mainline's lanes."""
+    mainline = scenario.mainline
+    shares, key = mainline.lane_shares, "mainline.lane_shares"
+    if shares is None:
+        return []
+    if len(shares) != mainline.lanes:
+        line = f"{key}: there are {len(shares)} for mainline.lanes {mainline.lanes}"
+        return [f"{line}; allowed is one a lane, from the one next to the ramp on"]
+    if abs(math.fsum(shares) - 1.0) > SHARES_WITHIN:
+        return [f"{key}: they sum to {math.fsum(shares):g}; allowed is a sum of 1"]
+    return []
+
+
 def _flow_problems(scenario: "Scenario") -> list[str]:
     if scenario.arrivals:
         return _list_problems(scenario)
+    if scenario.demand:
+        return []  # its parts are checked each
     problems = []
-    for name, stream in (("mainline", scenario.mainline), ("ramp", scenario.ramp)):
-        most = 3600.0 / stream.min_headway_s
+    shares = (max(scenario.mainline.shares), 1.0)
+    streams = (("mainline", scenario.mainline), ("ramp", scenario.ramp))
+    for (name, stream), share in zip(streams, shares, strict=True):
+        most = 3600.0 / stream.min_headway_s / share
         flows = (("flow_veh_h", stream.flow_veh_h), ("flow_to_veh_h", stream.flow_to_veh_h))
         problems += [
             f"{name}.{key}: {flow:g} cannot arrive with headways of "
@@ -108,7 +130,7 @@ def _flow_problems(scenario: "Scenario") -> list[str]:
 
 def _list_problems(scenario: "Scenario") -> list[str]:
     problems = []
-    last_s: dict[str, float] = {}
+    last_s: dict[tuple[str, int], float] = {}
     late = [k for k, a in enumerate(scenario.arrivals) if a.time_s > scenario.simulation.horizon_s]
     if late:
         first_s = scenario.arrivals[late[0]].time_s
@@ -126,17 +148,21 @@ def _list_problems(scenario: "Scenario") -> list[str]:
                 f"{key}.speed_mps: {arrival.speed_mps:g} is above {arrival.stream}.limit_mps; "
                 f"allowed is up to {limit:g} m/s"
             )
-        if arrival.time_s <= last_s.get(arrival.stream, -1.0):
+        own = arrival.stream, arrival.lane
+        if arrival.lane >= (scenario.mainline.lanes if arrival.stream == "mainline" else 1):
+            lanes = f"mainline.lanes is {scenario.mainline.lanes}, the ramp has one"
+            problems.append(f"{key}.lane: there is no lane {arrival.lane} ({lanes}); 0 is first")
+        if arrival.time_s <= last_s.get(own, -1.0):
             problems.append(
                 f"{key}.time_s: {arrival.time_s:g} does not come after the one before it on the "
-                f"{arrival.stream}; allowed is above {last_s[arrival.stream]:g} s"
+                f"{arrival.stream}; allowed is above {last_s[own]:g} s"
             )
         if not is_multiple(arrival.time_s, scenario.control.step_s):
             problems.append(
                 f"{key}.time_s: {arrival.time_s:g} is not on the step grid; "
                 f"allowed are multiples of {scenario.control.step_s:g} s"
             )
-        last_s[arrival.stream] = arrival.time_s
+        last_s[own] = arrival.time_s
     return problems
 
 

@@ -1,4 +1,4 @@
-"""Arrivals that are listed one by one: a list and a flow never stand side by side."""
+"""Arrivals that are listed, and demand over time: neither stands beside a flow."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -5,8 +5,11 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.scenarios.defaults import with_defaults, with_populations
+from coramp.scenarios.demand_flows import with_demand_flows
 from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
+from coramp.scenarios.measured import with_counts
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.network_section import check_network, with_path
 from coramp.scenarios.population_files import with_population, with_population_of_traffic
 from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
@@ -26,6 +29,7 @@ def load_scenario(
     thing that is wrong.
     """
     label, data = read("scenarios", name)
+    data = with_path(data, label)
     data, in_kmh = data_in_mps(data, label)
     overrides = overrides or {}
     blamed = {key: (origins or {}).get(key, "--set") for key in overrides}
@@ -35,9 +39,12 @@ def load_scenario(
     data = with_population_of_traffic(data, name, "traffic.drivers" in overrides)
     for own, table in (populations or {}).items():
         data = with_population(data, own, table)
-    data = with_preset(data)
+    data = with_counts(with_preset(data), label, blamed)
+    data = with_demand_flows(data, label, blamed)
     data = with_defaults(with_listed_flows(data, label, blamed), label)
-    return validated(Scenario, data, label, {**in_kmh, **blamed})
+    scenario = validated(Scenario, data, label, {**in_kmh, **blamed})
+    check_network(scenario, label)
+    return scenario
 
 
 def builtin_scenarios() -> list[Scenario]:

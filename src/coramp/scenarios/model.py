@@ -9,7 +9,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -18,6 +20,8 @@ from coramp.equations.safe_distance import braking_distance_m
 from coramp.errors import CorampError
 from coramp.road.rules import Control, MotionLimits, Road, Rules, SafetyBudget, Traffic
 from coramp.scenarios.checks import problems_of
+from coramp.scenarios.demand_sections import CountsFile, DemandPart, Detector
+from coramp.scenarios.network_section import NetworkSection
 from coramp.scenarios.quantities import FASTEST_MPS
 from coramp.scenarios.sections import (
     Controller,
@@ -73,6 +77,7 @@ class Scenario(Model):
     description: str = ""
     mainline: Mainline
     ramp: Ramp
+    network: NetworkSection | None = None
     vehicle: Vehicles = Vehicle()
     safety: Safety = Safety()
     motion: Motion = Motion()
@@ -91,6 +96,18 @@ class Scenario(Model):
     road: RoadSurface = RoadSurface()
     behaviour: Behaviour = Behaviour()
     incidents: Incidents = Incidents()
+    demand: Annotated[tuple[DemandPart, ...], Field(strict=False)] = ()
+    counts: CountsFile | None = None
+    detector: Annotated[tuple[Detector, ...], Field(strict=False)] = ()
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_used(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A scenario without these tables is written, and hashed, as if there were no such."""
+        data: dict[str, Any] = handler(self)
+        for name in ("demand", "counts", "detector"):
+            if not data.get(name):
+                data.pop(name, None)
+        return data
 
     @field_validator("strategy", mode="before")
     @classmethod
@@ -151,6 +168,11 @@ class Scenario(Model):
     def has_faults(self) -> bool:
         """Whether the world of this scenario is not perfect."""
         return not all(getattr(self, table).is_perfect for table in TABLES)
+
+    @property
+    def has_one_lane(self) -> bool:
+        """Whether its road is coramp's own of one mainline lane, for which all strategies plan."""
+        return self.network is None and self.mainline.lanes == 1
 
     @property
     def has_automated(self) -> bool:
@@ -231,6 +253,8 @@ class Scenario(Model):
     def decision_station_m(self) -> float:
         """Where ramp vehicles are planned: as given, or as suits the speeds."""
         given = self.ramp.decision_station_m
+        if given is None and not self.has_one_lane:
+            return 0.5 * self.ramp.start_m  # nobody is planned there
         return chosen_decision_station_m(self) if given is None else given
 
     @property

@@ -24,6 +24,7 @@ Flow = Annotated[float, Field(ge=0.0)]
 Headway = Annotated[float, Field(gt=0.0, le=60.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+SharePart = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 def _one_or_list(value: Any) -> str:
@@ -53,9 +54,20 @@ class Stream(Model):
 
 
 class Mainline(Stream):
-    """The mainline lane of the control zone; station 0 is the end of the ramp."""
+    """The mainline of the control zone; station 0 is the end of the ramp.
+
+    Its flow is that of all ``lanes``. ``lane_shares`` are the shares of it that enter on each lane,
+    from the outermost on, next to the ramp; left out, all are alike.
+    """
 
     end_m: Annotated[float, Field(gt=0.0, le=20000.0)]
+    lanes: Annotated[int, Field(ge=1, le=4)] = 1
+    lane_shares: Annotated[tuple[SharePart, ...], Field(strict=False)] | None = None
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """The share of the flow that enters on each lane, from the outermost on."""
+        return self.lane_shares or (1.0 / self.lanes,) * self.lanes
 
 
 class Ramp(Stream):
@@ -174,9 +186,6 @@ class DriverPopulation(Model):
         return self.tau_s if isinstance(self.tau_s, tuple) else (self.tau_s,)
 
 
-SharePart = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
 class TrafficMix(Model):
     """Which vehicles are automated and which have drivers, in SUMO.
 
@@ -216,6 +225,7 @@ class ExplicitArrival(Model):
     """One vehicle of a given list of arrivals; times lie on the step grid.
 
     Left out, ``type`` is the first type of the scenario, and ``top_speed_mps`` the mean of its own.
+    ``lane`` is that of the mainline, 0 next to the ramp.
     """
 
     stream: Literal["mainline", "ramp"]
@@ -224,6 +234,7 @@ class ExplicitArrival(Model):
     length_m: Length | None = None
     type: str | None = None
     top_speed_mps: Speed | None = None
+    lane: Annotated[int, Field(ge=0, le=3)] = 0
 
 
 class Simulation(Model):

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.demand.arrivals import generator
+from coramp.demand.generators import generator
 from coramp.mixed.situation import Steering
 from coramp.mixed.users import RoadUsers, onwards
 from coramp.scenarios.model import Scenario

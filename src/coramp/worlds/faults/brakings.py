@@ -3,7 +3,7 @@
 import numpy as np
 
 from coramp._kernel import FloatArray
-from coramp.demand.arrivals import generator
+from coramp.demand.generators import generator
 
 SECONDS_AN_HOUR = 3600.0
 MANY = 64

@@ -8,7 +8,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.plant import Arrival
-from coramp.demand.arrivals import generator
+from coramp.demand.generators import generator
 from coramp.mixed.users import RoadUsers
 from coramp.scenarios.model import Scenario
 from coramp.worlds.faults.brakings import due_s

@@ -65,6 +65,7 @@ def _run_cooperative(
             Path(name), scenario, plan, seed, options, ballistic=True, sampled=sampled or keep
         )
         files.write_routes(cooperative_routes(scenario, arrivals, with_vehicles=False))
+        files.write_detectors(arrivals)
         with Session(
             [*files.options(), "--insertion-checks", "none"],
             rules.control.step_s,

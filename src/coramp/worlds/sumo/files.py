@@ -11,8 +11,18 @@ import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.coordination.plant import Arrival
-from coramp.records.run_folder import SUMO_COMMAND, SUMO_COPIES, SUMO_LOOPS, SUMO_NETWORK
+from coramp.records.files import write_text
+from coramp.records.run_folder import (
+    DETECTED,
+    SUMO_COMMAND,
+    SUMO_COPIES,
+    SUMO_DETECTED,
+    SUMO_DETECTORS,
+    SUMO_LOOPS,
+    SUMO_NETWORK,
+)
 from coramp.scenarios.model import Scenario
+from coramp.worlds.sumo.detectors import Loop, counted, loops_file, loops_of
 from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan, network_file
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
@@ -67,7 +77,9 @@ class RunFiles:
         sampled: bool = False,
     ) -> None:
         self._folder = folder
+        self._scenario = scenario
         self._plan = plan
+        self._detectors: list[Loop] = []
         self._step_s = scenario.control.step_s
         self._seed = seed
         self._keep_in = options.keep_in
@@ -83,8 +95,19 @@ class RunFiles:
         """Writes the file of loop detectors; without it there are none."""
         (self._folder / SUMO_LOOPS).write_text(text)
 
-    def _loops(self, name: Path) -> list[str]:
-        return ["--additional-files", str(name)] if (self._folder / SUMO_LOOPS).exists() else []
+    def write_detectors(self, arrivals: Sequence[Arrival]) -> None:
+        """Writes the scenario's detectors where SUMO's files are kept; routes must be written."""
+        if self._keep_in is None or not self._scenario.detector:
+            return
+        routes = (self._folder / "routes.rou.xml").read_text()
+        self._detectors = loops_of(self._scenario, self._plan, arrivals, routes)
+        (self._folder / SUMO_DETECTORS).write_text(loops_file(self._detectors))
+
+    def _loops(self, folder: Path | None = None) -> list[str]:
+        """The option that names the files of loops, in a folder or where SUMO is started."""
+        names = [name for name in (SUMO_LOOPS, SUMO_DETECTORS) if (self._folder / name).exists()]
+        paths = [name if folder is None else str(folder / name) for name in names]
+        return ["--additional-files", ",".join(paths)] if paths else []
 
     def options(self) -> list[str]:
         """Returns SUMO's options, output files included."""
@@ -94,7 +117,7 @@ class RunFiles:
             *("--route-files", str(folder / "routes.rou.xml")),
             *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
-            *self._loops(folder / SUMO_LOOPS),
+            *self._loops(folder),
         ]
         result += self._step_method
         if self._sampled or self._keep_in is not None:
@@ -122,12 +145,16 @@ class RunFiles:
         shutil.copy(network_file(self._plan), self._keep_in / SUMO_NETWORK)
         for name in SUMO_COPIES:
             shutil.copy(self._folder / name, self._keep_in / name)
-        if self._loops(Path(SUMO_LOOPS)):
-            shutil.copy(self._folder / SUMO_LOOPS, self._keep_in / SUMO_LOOPS)
+        for name in (SUMO_LOOPS, SUMO_DETECTORS, SUMO_DETECTED):
+            if (self._folder / name).exists():
+                shutil.copy(self._folder / name, self._keep_in / name)
+        if self._detectors:
+            counts = counted(self._folder / SUMO_DETECTED, self._detectors)
+            write_text(self._keep_in / DETECTED, counts.write_csv())
         command = [
             *("sumo", "--net-file", SUMO_NETWORK, "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
-            *self._loops(Path(SUMO_LOOPS)),
+            *self._loops(),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *self._step_method,
         ]

@@ -75,6 +75,7 @@ def begun(
     actuators = actuators_of(scenario, len(arrivals))
     types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
     files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
+    files.write_detectors(arrivals)
     with Session(files.options(), step_s, options.gui, options.tell) as session:
         plant = MixedPlant(
             session,

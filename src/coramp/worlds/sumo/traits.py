@@ -8,7 +8,7 @@ import numpy as np
 
 from coramp._kernel import FloatArray
 from coramp.coordination.plant import Arrival
-from coramp.demand.arrivals import generator
+from coramp.demand.generators import generator
 from coramp.road.streams import STREAMS
 from coramp.scenarios.sections import DriverPopulation, SpeedFactor
 from coramp.scenarios.world_sections import Behaviour

@@ -59,6 +59,7 @@ def run_uncontrolled(
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
         files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered, automated))
+        files.write_detectors(arrivals)
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
             files.write_loops(loops(scenario, look_steps * step_s))

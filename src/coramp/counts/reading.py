@@ -1,0 +1,100 @@
+"""Reading counts: CSV and Parquet with named columns, and SUMO's own formats."""
+
+import io
+import math
+from collections.abc import Sequence
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from coramp.counts.checks import check_balance, that_add_up
+from coramp.counts.sumo_xml import lines_of_xml
+from coramp.counts.table import Counts, Findings, Line, counts_of, told_briefly
+from coramp.counts.tabular import Read, lines_of_table
+from coramp.counts.text import Words, content_of, text_of, words_of
+from coramp.errors import CorampError
+
+PARQUET = b"PAR1"
+XML = b"<"
+ROOM = 50.0
+"""So many vehicles may be on the way between detectors."""
+
+
+def read_counts(
+    path: Path | str,
+    repair: bool = False,
+    lanes: int | None = None,
+    *,
+    upstream: Sequence[str] = (),
+    downstream: str | None = None,
+) -> Counts:
+    """Returns the counts of a file; with ``repair``, what can be mended is mended and listed.
+
+    Formats: CSV or Parquet with a row for each interval, detector, lane and class (columns ``time``
+    or ``begin_s``, ``end_s``, ``detector`` or ``edge``, ``lane``, ``class``, ``vehicles`` or
+    ``flow_veh_h``, ``mean_speed_mps`` or ``mean_speed_kmh``); the CSV of dfrouter and flowrouter;
+    SUMO's output of induction loops, its routes and its flows. ``lanes`` is how many lanes a
+    detector has whose counts name none, else up to 6. With ``downstream`` it is checked that this
+    detector counted no less than those ``upstream``.
+
+    Raises CorampError with a line for each of the first 10 things that do not add up.
+    """
+    findings = Findings(repair)
+    path = Path(path)
+    content = content_of(path)
+    try:
+        lines, start = _lines_of(content, findings)
+    except CorampError as error:
+        raise CorampError(*(f"{path}: {line}" for line in error.messages)) from error
+    if not lines and not findings.problems:
+        raise CorampError(f"{path}: has no rows; allowed is a count in each row after the first")
+    lines = that_add_up(lines, findings, lanes)
+    if downstream is not None:
+        _check_known([*upstream, downstream], lines, path)
+        if not findings.problems:
+            lines = check_balance(lines, upstream, downstream, findings, ROOM)
+    if findings.problems:
+        problems = dict.fromkeys(sorted(findings.problems, key=lambda found: found.row))
+        told = [problem.line(str(path)) for problem in problems]
+        raise CorampError(*told_briefly(told))
+    return counts_of(lines, str(path), start, findings.repairs)
+
+
+def _check_known(names: Sequence[str], lines: Sequence[Line], path: Path) -> None:
+    known = sorted({line.detector for line in lines})
+    for name in names:
+        if name not in known:
+            raise CorampError(
+                f"{path}: there is no detector {name!r}; allowed are {', '.join(known)}"
+            )
+
+
+def _lines_of(content: bytes, findings: Findings) -> Read:
+    if content.startswith(PARQUET):
+        return lines_of_table(_words_of_parquet(content), findings)
+    if content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(XML):
+        return lines_of_xml(content, findings), None
+    words = words_of(text_of(content, findings))
+    return lines_of_table(words, findings)
+
+
+def _words_of_parquet(content: bytes) -> Words:
+    """The rows of a table as words; row 1 is the first of them, its head row 0."""
+    try:
+        frame = pl.read_parquet(io.BytesIO(content))
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise CorampError(f"cannot be read: {error}; allowed is a whole Parquet file") from error
+    rows = [[_word(value) for value in row] for row in frame.iter_rows()]
+    return [(0, frame.columns), *enumerate(rows, 1)]
+
+
+def _word(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, datetime | date):
+        return value.isoformat()
+    if isinstance(value, float) and math.isfinite(value) and value == int(value):
+        return str(int(value))
+    return str(value)
