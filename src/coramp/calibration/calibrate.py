@@ -1,7 +1,7 @@
 """Fits a population of drivers to what detectors at a merge told."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class Effort:
     seeds: int = 16
     jobs: int = 2
     report: Callable[[int, int], None] = lambda _done, _total: None
+
+    def told_to(self, report: Callable[[int, int], None]) -> "Effort":
+        """Returns the same, told to somebody else."""
+        return replace(self, report=report)
 
     @property
     def total(self) -> int:

@@ -4,15 +4,16 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
-from coramp.calibration.demand import arrivals_of_counts, saturated
+from coramp.calibration.demand import saturated
 from coramp.calibration.series import Series, queued, series_of
 from coramp.calibration.site import Site
 from coramp.metrics.queues import LOOP_M
+from coramp.scenarios.demand_sections import DemandPart, Detector
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
-from coramp.worlds.sumo.detected import Loop, Observed, detected
-from coramp.worlds.sumo.network import driver_road_plan, network_file
+from coramp.worlds.sumo.detected import build_network, detected
 
 
 @dataclass(frozen=True)
@@ -33,28 +34,52 @@ class Replayed:
         As many arrive in each interval as were counted where they enter; who arrives when in it
         depends on the seed alone. Raises CorampError where SUMO fails.
         """
-        interval_s, site = self.measured.interval_s, self.site
-        streams = (self.scenario.mainline, self.scenario.ramp)
-        entries = (site.mainline_entry, site.ramp_entry)
+        ahead_s = self._ahead_s
+        end_s = ahead_s + self.measured.intervals * self.measured.interval_s
+        found = series_of(detected(self.driven, drivers, seed)).between(ahead_s, end_s)
+        return Series(
+            self.measured.begin_s, self.measured.interval_s, found.vehicles, found.speed_mps
+        )
+
+    @property
+    def _ahead_s(self) -> float:
+        """How long before the measured series runs begin, so that the first vehicles get there."""
         ways_s = [
-            (loop.station_m - stream.start_m) / free_mps
-            for loop, stream, free_mps in zip(entries, streams, self.free_mps, strict=True)
+            (loop.station_m - getattr(self.scenario, loop.road).start_m) / free_mps
+            for loop, free_mps in self._entries
         ]
-        ahead_s = interval_s * math.ceil(max(ways_s) / interval_s)
-        counts = [
-            saturated(self.measured.vehicles[loop.id], queued(self.measured, loop.id, free_mps))
-            for loop, free_mps in zip(entries, self.free_mps, strict=True)
-        ]
-        lead_s = (ahead_s - ways_s[0], ahead_s - ways_s[1])
-        arrivals = arrivals_of_counts(
-            self.scenario, (counts[0], counts[1]), interval_s, lead_s, seed
-        )
-        end_s = ahead_s + self.measured.intervals * interval_s
-        told = detected(
-            self.scenario, drivers, Observed(arrivals, site.loops, interval_s, end_s), seed
-        )
-        found = series_of(told).between(ahead_s, end_s)
-        return Series(self.measured.begin_s, interval_s, found.vehicles, found.speed_mps)
+        interval_s = self.measured.interval_s
+        return interval_s * math.ceil(max(ways_s) / interval_s)
+
+    @property
+    def _entries(self) -> list[tuple[Detector, float]]:
+        """The detectors that count who comes, and the free speeds (m/s) there."""
+        entries = self.site.mainline_entry, self.site.ramp_entry
+        return list(zip(entries, self.free_mps, strict=True))
+
+    @cached_property
+    def driven(self) -> Scenario:
+        """The scenario with the measured demand and the detectors of the site."""
+        interval_s, ahead_s = self.measured.interval_s, self._ahead_s
+        demand = []
+        for loop, free_mps in self._entries:
+            slow = queued(self.measured, loop.id, free_mps)
+            counts = saturated(self.measured.vehicles[loop.id], slow)
+            demand += [
+                DemandPart(
+                    route=loop.road,
+                    begin_s=ahead_s + k * interval_s,
+                    end_s=ahead_s + (k + 1) * interval_s,
+                    vehicles=int(count),
+                    station_m=loop.station_m,
+                )
+                for k, count in enumerate(counts.tolist())
+            ]
+        loops = tuple(loop.model_copy(update={"period_s": interval_s}) for loop in self.site.loops)
+        horizon_s = ahead_s + self.measured.intervals * interval_s
+        simulation = self.scenario.simulation.model_copy(update={"horizon_s": horizon_s})
+        changed = {"demand": tuple(demand), "detector": loops, "simulation": simulation}
+        return self.scenario.model_copy(update={**changed, "arrivals": ()})
 
     def many(
         self,
@@ -67,7 +92,7 @@ class Replayed:
         ``done`` is called after each.
         """
         for drivers, _ in candidates:
-            network_file(driver_road_plan(self.scenario, drivers))  # built once, before threads do
+            build_network(self.driven, drivers)
 
         def one(candidate: tuple[DriverPopulation, int]) -> Series:
             found = self.series(*candidate)
@@ -78,7 +103,7 @@ class Replayed:
             return list(pool.map(one, candidates))
 
 
-def speed_loops(site: Site, start_m: float) -> list[Loop]:
+def speed_loops(site: Site, start_m: float) -> list[Detector]:
     """Returns the mainline's detectors before the nose at which drivers go as they wish.
 
     Who has just entered may still be speeding up: of detectors within half the way to the loop at

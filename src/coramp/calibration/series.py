@@ -115,9 +115,7 @@ def breakdown_of(series: Series, detector: str, free_mps: float) -> int | None:
     return None
 
 
-def capacity_veh_h(
-    series: Series, upstream: str, downstream: str, free_mps: float
-) -> float | None:
+def capacity_veh_h(series: Series, upstream: str, downstream: str, free_mps: float) -> float | None:
     """Returns the highest flow of 5 min past ``downstream`` before the breakdown, None without one.
 
     The queue is seen at ``upstream``.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from coramp.errors import CorampError
 from coramp.metrics.queues import LOOP_M
-from coramp.worlds.sumo.detected import Loop
+from coramp.scenarios.demand_sections import Detector
 
 
 @dataclass(frozen=True)
@@ -16,14 +16,14 @@ class Site:
     the nose, a queue is seen; ``downstream``, behind the acceleration lane, counts what leaves.
     """
 
-    loops: tuple[Loop, ...]
-    mainline_entry: Loop
-    ramp_entry: Loop
-    upstream: Loop
-    downstream: Loop
+    loops: tuple[Detector, ...]
+    mainline_entry: Detector
+    ramp_entry: Detector
+    upstream: Detector
+    downstream: Detector
 
 
-def site_of(loops: Sequence[Loop], acceleration_lane_m: float) -> Site:
+def site_of(loops: Sequence[Detector], acceleration_lane_m: float) -> Site:
     """Returns what detectors of a merge are for.
 
     Raises CorampError where one is missing that calibration needs.
@@ -47,7 +47,7 @@ def site_of(loops: Sequence[Loop], acceleration_lane_m: float) -> Site:
             f"detectors: none lies {' or '.join(missing)}; calibration needs one at each place"
         )
 
-    def station_m(loop: Loop) -> float:
+    def station_m(loop: Detector) -> float:
         return loop.station_m
 
     return Site(

@@ -12,6 +12,7 @@ from coramp.calibration.calibrate import Calibrated
 from coramp.calibration.moments import OBJECTIVE
 from coramp.errors import CorampError
 from coramp.records.files import write_text
+from coramp.scenarios.population_files import ENDING
 
 HEAD = "# Drivers fitted to detectors by coramp calibrate; use them by coramp run --drivers FILE.\n"
 
@@ -46,14 +47,16 @@ def sha256_of(path: Path) -> str:
         raise CorampError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def name_of(out: Path) -> str:
-    """Returns the population's name, the file's without its ending.
+def checked_out(out: Path) -> Path:
+    """Returns a file to write drivers into; its name without the ending will be theirs.
 
-    Raises CorampError for a file that could not be given to ``--drivers``.
+    Raises CorampError for one that could not be given to ``--drivers``, or has no folder.
     """
-    if out.suffix != ".toml":
-        raise CorampError(f"--out: {out}: does not end in .toml; allowed is a file like drivers.toml")
-    return out.stem
+    if out.suffix != ENDING or not out.stem:
+        raise CorampError(f"--out: {out}: does not end in .toml; allowed is such as drivers.toml")
+    if not out.parent.is_dir():
+        raise CorampError(f"--out: {out.parent}: no such folder; allowed is one that is there")
+    return out
 
 
 def population_text(found: Calibrated, name: str, origin: Provenance) -> str:
@@ -82,7 +85,7 @@ def population_text(found: Calibrated, name: str, origin: Provenance) -> str:
 
 def write_population(found: Calibrated, out: Path, origin: Provenance) -> None:
     """Writes a population; what was there under that name is replaced as a whole."""
-    write_text(out, population_text(found, name_of(out), origin))
+    write_text(out, population_text(found, checked_out(out).stem, origin))
 
 
 def _rounded(value: float) -> float | int:

@@ -149,10 +149,7 @@ def make_spec(
     blame = {**blame_kmh, **{key: OPTIONS[key] for key in named}}
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
-    populations: dict[str, Any] = {}
-    if drivers is not None and is_population_file(drivers):
-        drivers, table = read_population(drivers)
-        populations[drivers] = table
+    drivers, populations = _drivers_asked(drivers)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame, populations)
     _check_types(loaded, chosen)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
@@ -168,6 +165,14 @@ def make_spec(
     elif chosen.cooperative:
         population = None
     return RunSpec(loaded, strategy, engine, population, seed, _differing(scenario, others))
+
+
+def _drivers_asked(drivers: str | None) -> tuple[str | None, dict[str, Any]]:
+    """Returns the name of drivers and, where they lie in a file, their table by that name."""
+    if drivers is None or not is_population_file(drivers):
+        return drivers, {}
+    name, table = read_population(drivers)
+    return name, {name: table}
 
 
 def _check_types(scenario: Scenario, strategy: type[Strategy]) -> None:

@@ -55,7 +55,7 @@ def with_population(data: Mapping[str, Any], name: str, table: Mapping[str, Any]
 def with_population_of_traffic(
     data: Mapping[str, Any], scenario: str, from_option: bool
 ) -> dict[str, Any]:
-    """Returns the content of a scenario whose ``traffic.drivers`` may be a file, with what it holds.
+    """Returns the content of a scenario whose ``traffic.drivers`` may be a file, with that.
 
     The path of a file counts from the folder of the scenario's, or from the current one if an
     option gave it.
