@@ -29,7 +29,6 @@ USUAL_DEVIATION = 0.07
 """Spread of wishes over their mean where the data does not tell it: that of ``credible``."""
 ROUNDS = ((2, 0.5, 0.3), (1, 0.25, 0.2), (1, 0.12, 0.1))
 """Quarters of the runs, half width and reach of each round."""
-SPEED_SEEDS, FIT_RUNS = 4, 8
 LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
 """Least noise of the numbers that the search compares, by what their names end in."""
 
@@ -38,12 +37,15 @@ LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
 class Effort:
     """How much is simulated: ``runs`` of the search, through ``seeds`` by turns, ``jobs`` at once.
 
-    ``report`` is told after each run how many of how many are done.
+    ``speed_runs`` look at desired speeds each of three times, ``fit_runs`` at the fit of what was
+    found. ``report`` is told after each run how many of how many are done.
     """
 
     runs: int = 96
     seeds: int = 16
     jobs: int = 2
+    speed_runs: int = 4
+    fit_runs: int = 8
     report: Callable[[int, int], None] = lambda _done, _total: None
 
     def told_to(self, report: Callable[[int, int], None]) -> "Effort":
@@ -53,7 +55,7 @@ class Effort:
     @property
     def total(self) -> int:
         """How many runs a calibration takes."""
-        return self.runs + 3 * SPEED_SEEDS + FIT_RUNS
+        return self.runs + 3 * self.speed_runs + self.fit_runs
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def calibrate_series(
     replayed = Replayed(scenario, site, window, free_mps)
     drivers = _searched(replayed, drivers, AXES[model], effort, done)
     drivers = _with_speeds(at_will, drivers, effort, done, with_spread=False)
-    fitted = replayed.many([(drivers, 1 + k) for k in range(FIT_RUNS)], effort.jobs, done)
+    fitted = replayed.many([(drivers, 1 + k) for k in range(effort.fit_runs)], effort.jobs, done)
     fit = fit_of(fitted, window, site, free.mean_mps)
     return Calibrated(drivers, free, fit, tuple(notes))
 
@@ -180,7 +182,7 @@ def _with_speeds(
     when = free_intervals(measured, *ends, free_mps, measured.end_s)
     names = [loop.id for loop in speed_loops(site, replayed.scenario.mainline.start_m)]
     wanted = free_speed(measured, names, when)
-    runs = replayed.many([(drivers, 1 + k) for k in range(SPEED_SEEDS)], effort.jobs, done)
+    runs = replayed.many([(drivers, 1 + k) for k in range(effort.speed_runs)], effort.jobs, done)
     found = [free_speed(run, names, when) for run in runs]
     factor = drivers.speed_factor
     assert factor is not None

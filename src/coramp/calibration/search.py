@@ -166,7 +166,11 @@ def search(
 
 def _nearest_runs(runs: Runs, measured: FloatArray, floor: FloatArray) -> FloatArray:
     """Returns the middle of the runs that are nearest to what was measured, number by number."""
-    spread = np.maximum(np.nan_to_num(np.nanstd(runs.numbers, axis=0)), floor)
+    told = ~np.isnan(runs.numbers)
+    counts = np.maximum(1, told.sum(0))
+    off = np.where(told, runs.numbers, 0.0)
+    off = np.where(told, off - off.sum(0) / counts, 0.0)
+    spread = np.maximum(np.sqrt((off**2).sum(0) / counts), floor)
     off = np.abs((runs.numbers - measured) / spread)
     known = ~np.isnan(measured)
     distance = np.where(np.isnan(off), 2.0, np.minimum(off, 2.0))[:, known].mean(1)
