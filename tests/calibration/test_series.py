@@ -55,9 +55,7 @@ def test_lanes_and_classes_are_taken_together_by_vehicles():
 
 
 def test_minutes_become_five_minutes_and_a_rest_is_dropped():
-    fine = Series(
-        0.0, 60.0, {"a": np.arange(11.0)}, {"a": np.array([NAN, *np.arange(10.0, 20.0)])}
-    )
+    fine = Series(0.0, 60.0, {"a": np.arange(11.0)}, {"a": np.array([NAN, *np.arange(10.0, 20.0)])})
     coarse = fine.coarse()
     assert coarse.interval_s == 300.0
     assert coarse.vehicles["a"].tolist() == [10.0, 35.0]
