@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 from coramp.cli.ramp_listing import ramp_rows
+from coramp.demand import counts
 from coramp.messages import kinds
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
@@ -54,6 +55,7 @@ FILES = {
     "on_board.parquet": schemas.ON_BOARD,
     "streams.parquet": schemas.STREAM_ROWS,
     "messages.parquet": kinds.COLUMNS,
+    "detectors.csv": counts.SCHEMA,
 }
 RAMPS = "coramp ramps --json"
 MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}

@@ -17,7 +17,6 @@ from coramp.counts.table import Counts
 from coramp.errors import CorampError
 from coramp.metrics.queues import INTERVAL_S
 from coramp.scenarios.loading import load_scenario
-from coramp.scenarios.model import Scenario
 
 LONGEST_S = 3.0 * INTERVAL_S
 
@@ -46,7 +45,6 @@ def calibrated(
     """
     model = model_checked(asked.model)
     loaded = load_scenario(scenario, asked.overrides)
-    _check_road(loaded, scenario)
     read = read_counts(counts, asked.repair, loaded.mainline.lanes)
     known = [loop for loop in loaded.detector if loop.id in read.detectors]
     if not known:
@@ -65,14 +63,6 @@ def calibrated(
         counts.name, sha256_of(counts), loaded.name, model, effort.runs, effort.seeds, asked.date
     )
     return found, origin
-
-
-def _check_road(scenario: Scenario, name: str) -> None:
-    if scenario.network is not None:
-        raise CorampError(
-            f"{name}: network: calibration drives on roads that coramp makes; allowed is a "
-            "scenario of its lengths and limits, without [network]"
-        )
 
 
 def _whole(counts: Counts, detectors: list[str]) -> pl.DataFrame:

@@ -1,5 +1,7 @@
 """What of a population of drivers is fitted, by car-following model, and within which ranges."""
 
+from typing import Literal
+
 from coramp.calibration.search import Axis
 from coramp.errors import CorampError
 from coramp.scenarios.sections import DriverPopulation, SpeedFactor
@@ -17,7 +19,11 @@ AXES = {
     "eidm": COMMON,
 }
 """Usual values are SUMO's: what detectors do not show stays near them."""
-SUMO_NAMES = {"krauss": "Krauss", "idm": "IDM", "eidm": "EIDM"}
+SUMO_NAMES: dict[str, Literal["Krauss", "IDM", "EIDM"]] = {
+    "krauss": "Krauss",
+    "idm": "IDM",
+    "eidm": "EIDM",
+}
 CUT_OFF = 2.0
 """How many standard deviations from the mean speed factors are cut off."""
 LEAST_DEVIATION = 0.002

@@ -11,12 +11,15 @@ functions, which cost nothing. New runs around that place refine them, round by 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.optimize import differential_evolution
+import scipy.optimize as untyped_optimize
 from scipy.stats import qmc
 
 from coramp._kernel import BoolArray, FloatArray
+
+optimize: Any = untyped_optimize
 
 RIDGE = 1e-2
 """Weight against steep functions, in units of one run's: it decides what runs leave open."""
@@ -183,7 +186,7 @@ def _least(
 ) -> FloatArray:
     low = np.clip(surrogate.centre - half_width, 0.0, 1.0)
     high = np.clip(surrogate.centre + half_width, 0.0, 1.0)
-    found = differential_evolution(
+    found = optimize.differential_evolution(
         lambda columns: costs(surrogate, measured, usual, np.atleast_2d(columns.T)),
         list(zip(low, high, strict=True)),
         seed=0,

@@ -34,13 +34,16 @@ COMFORT_MPS2 = 4.5
 
 
 class Seen(NamedTuple):
-    """Where vehicles were at each step, by vehicle and time; lengths and kinds by vehicle."""
+    """Where vehicles were at each step, by vehicle and time; lengths and kinds by vehicle.
+
+    ``lane`` is that of the mainline, 0 next to the ramp, or -1 on ramp and acceleration lane.
+    """
 
     vehicle: IntArray
     time_s: FloatArray
     station_m: FloatArray
     speed_mps: FloatArray
-    on_mainline: BoolArray
+    lane: IntArray
     length_m: FloatArray
     automated: BoolArray
 
@@ -132,10 +135,10 @@ def findings_of(
 
 def pairs_of(seen: Seen) -> Pairs:
     """Returns all pairs of neighbours in a lane, step by step."""
-    order = np.lexsort((-seen.station_m, seen.on_mainline, seen.time_s))
+    order = np.lexsort((-seen.station_m, seen.lane, seen.time_s))
     front, rear = order[:-1], order[1:]
     together = seen.time_s[front] == seen.time_s[rear]
-    together &= seen.on_mainline[front] == seen.on_mainline[rear]
+    together &= seen.lane[front] == seen.lane[rear]
     front, rear = front[together], rear[together]
     tail_m = seen.station_m[front] - seen.length_m[seen.vehicle[front]]
     return Pairs(rear, front, tail_m - seen.station_m[rear])
@@ -144,9 +147,7 @@ def pairs_of(seen: Seen) -> Pairs:
 def _came_in(seen: Seen) -> BoolArray:
     """Whether each row is a vehicle's first in another lane."""
     same = seen.vehicle[1:] == seen.vehicle[:-1]
-    return np.append(False, same & (seen.on_mainline[1:] != seen.on_mainline[:-1]))[
-        : len(seen.vehicle)
-    ]
+    return np.append(False, same & (seen.lane[1:] != seen.lane[:-1]))[: len(seen.vehicle)]
 
 
 def _braking_mps2(seen: Seen) -> FloatArray:

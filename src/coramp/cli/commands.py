@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from coramp.cli.calibration_commands import calibration
+from coramp.cli.demand_commands import demand
 from coramp.cli.listing_commands import listing
 from coramp.cli.network_commands import networks
 from coramp.cli.options import DEBUG
@@ -41,5 +42,5 @@ def _options(
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
 
-for commands in (listing, networks, computing, calibration, showing):
+for commands in (listing, networks, demand, computing, calibration, showing):
     app.add_typer(commands)

@@ -60,11 +60,15 @@ def ramps(
 @networks.command(
     "new-scenario",
     epilog="Example: coramp new-scenario a10 --net osm.net.xml --ramp 24498409@4054057\n\n"
-    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057",
+    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057\n\n"
+    "Example: coramp new-scenario morning --counts morning.csv --mainline-detector M "
+    "--ramp-detector R --detector M=-350 --detector R=-300",
 )
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
-    ramp: Annotated[str, typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it.")],
+    ramp: Annotated[
+        str | None, typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it.")
+    ] = None,
     net: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
     ] = None,
@@ -72,21 +76,57 @@ def new_scenario(
         Path | None,
         typer.Option(metavar="FILE", help="An extract of OpenStreetMap, for netconvert."),
     ] = None,
+    road: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENARIO",
+            help="With --counts: the road of this scenario (default: paper) instead of a network.",
+        ),
+    ] = None,
+    counts: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Demand as counted; coramp counts shows such a file."),
+    ] = None,
+    mainline_detector: Annotated[
+        str | None, typer.Option(metavar="ID", help="The detector of the mainline in --counts.")
+    ] = None,
+    ramp_detector: Annotated[
+        str | None, typer.Option(metavar="ID", help="The detector of the ramp in --counts.")
+    ] = None,
+    detector: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ID=STATION",
+            help="Where a detector is, in m from the nose (default: 50 m behind the entry); one "
+            "of another name is a further one on the mainline.",
+        ),
+    ] = None,
+    classes: Annotated[
+        list[str] | None,
+        typer.Option("--class", metavar="CLASS=TYPE", help="Of which type a class in --counts is."),
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option(help="Mend what does not add up in --counts, and list it.")
+    ] = False,
 ) -> None:
-    """Write a scenario of an on-ramp in a SUMO network.
+    """Write a scenario of an on-ramp in a SUMO network, or with demand as counted, or both.
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
+    from coramp.cli.new_scenario import Asked, content_of
     from coramp.records.files import write_text
-    from coramp.scenarios.new_scenario import new_scenario_text, osm_network_beside
+    from coramp.scenarios.new_scenario import new_scenario_text
 
-    if (net is None) == (osm is None):
-        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
     target = Path(f"{name}.toml")
     if target.exists():
         raise CorampError(f"{target}: is there already; give another name, or move it away")
-    if net is None and osm is not None:
-        net = osm_network_beside(osm, target)
-    if net is not None:
-        write_text(target, new_scenario_text(target.stem, net, ramp, target.parent))
-    print(f"Written: {target}; now coramp run {target} --strategy mixed-slots")
+    asked = Asked(
+        *(ramp, net, osm, road, counts, mainline_detector, ramp_detector),
+        *(detector or [], classes or [], repair),
+    )
+    content, repairs = content_of(asked, target)
+    write_text(target, new_scenario_text(content, target))
+    for line in repairs:
+        print(f"Repaired: {line}", file=sys.stderr)
+    strategy = " --strategy mixed-slots" if "network" in content else ""
+    print(f"Written: {target}; now coramp run {target}{strategy}")

@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,15 @@ import polars as pl
 
 from coramp.counts.checks import check_balance, that_add_up
 from coramp.counts.sumo_xml import lines_of_xml
-from coramp.counts.table import Counts, Findings, Line, counts_of, told_briefly
+from coramp.counts.table import (
+    Counts,
+    Findings,
+    Line,
+    Problem,
+    Repair,
+    counts_of,
+    told_briefly,
+)
 from coramp.counts.tabular import Read, lines_of_table
 from coramp.counts.text import Words, content_of, text_of, words_of
 from coramp.errors import CorampError
@@ -20,6 +29,57 @@ PARQUET = b"PAR1"
 XML = b"<"
 ROOM = 50.0
 """So many vehicles may be on the way between detectors."""
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a file of counts holds, whether it adds up or not.
+
+    ``lines`` are its counts, after repairs; ``problems`` is what does not add up, by row.
+    """
+
+    source: str
+    lines: list[Line]
+    start: datetime | None
+    problems: list[Problem]
+    repairs: list[Repair]
+
+    @property
+    def told(self) -> list[str]:
+        """What does not add up, a line each, brief where there is much."""
+        return told_briefly([problem.line(self.source) for problem in self.problems])
+
+
+def examined(
+    path: Path | str,
+    repair: bool = False,
+    lanes: int | None = None,
+    *,
+    upstream: Sequence[str] = (),
+    downstream: str | None = None,
+) -> Examined:
+    """Returns what a file of counts holds and what does not add up; see ``read_counts``.
+
+    Raises CorampError for a file that cannot be read as counts at all.
+    """
+    findings = Findings(repair)
+    path = Path(path)
+    content = content_of(path)
+    try:
+        lines, start = _lines_of(content, findings)
+    except CorampError as error:
+        earlier = [problem.line(str(path)) for problem in findings.problems]
+        messages = [*earlier, *(f"{path}: {line}" for line in error.messages)]
+        raise CorampError(*told_briefly(messages)) from error
+    if not lines and not findings.problems:
+        raise CorampError(f"{path}: has no rows; allowed is a count in each row after the first")
+    lines = that_add_up(lines, findings, lanes)
+    if downstream is not None:
+        _check_known([*upstream, downstream], lines, path)
+        if not findings.problems:
+            lines = check_balance(lines, upstream, downstream, findings, ROOM)
+    problems = list(dict.fromkeys(sorted(findings.problems, key=lambda found: found.row)))
+    return Examined(str(path), lines, start, problems, findings.repairs)
 
 
 def read_counts(
@@ -41,25 +101,10 @@ def read_counts(
 
     Raises CorampError with a line for each of the first 10 things that do not add up.
     """
-    findings = Findings(repair)
-    path = Path(path)
-    content = content_of(path)
-    try:
-        lines, start = _lines_of(content, findings)
-    except CorampError as error:
-        raise CorampError(*(f"{path}: {line}" for line in error.messages)) from error
-    if not lines and not findings.problems:
-        raise CorampError(f"{path}: has no rows; allowed is a count in each row after the first")
-    lines = that_add_up(lines, findings, lanes)
-    if downstream is not None:
-        _check_known([*upstream, downstream], lines, path)
-        if not findings.problems:
-            lines = check_balance(lines, upstream, downstream, findings, ROOM)
-    if findings.problems:
-        problems = dict.fromkeys(sorted(findings.problems, key=lambda found: found.row))
-        told = [problem.line(str(path)) for problem in problems]
-        raise CorampError(*told_briefly(told))
-    return counts_of(lines, str(path), start, findings.repairs)
+    found = examined(path, repair, lanes, upstream=upstream, downstream=downstream)
+    if found.problems:
+        raise CorampError(*found.told)
+    return counts_of(found.lines, found.source, found.start, found.repairs)
 
 
 def _check_known(names: Sequence[str], lines: Sequence[Line], path: Path) -> None:

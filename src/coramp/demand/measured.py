@@ -13,9 +13,11 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.demand.generators import generator
 from coramp.demand.passing import Clock, Stream
+from coramp.networks.limits import limits_along
 from coramp.road.streams import STREAMS
 from coramp.scenarios.demand_sections import DemandPart
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.network_section import site_of
 from coramp.scenarios.vehicle_types import VehicleType
 
 Name = TypeVar("Name", int, str)
@@ -177,8 +179,30 @@ def undisturbed_s(
     drivers = scenario.drivers.get(scenario.traffic.drivers)
     if drivers is not None and drivers.wish == "entry-speed":
         return np.asarray(way_m / entry_mps)
-    road_mps = (scenario.ramp if on_ramp else scenario.mainline).speed_mps
-    cruise_mps = np.minimum(road_mps, top_mps)
-    away_mps = cruise_mps - entry_mps
-    lost_s = np.sign(away_mps) * away_mps**2 / (2.0 * FREE_MPS2 * cruise_mps)
-    return np.asarray(way_m / cruise_mps + lost_s)
+    start_m = (scenario.ramp if on_ramp else scenario.mainline).start_m
+    total_s = np.zeros(len(way_m))
+    stretches = speeds_along(scenario, on_ramp)
+    for from_m, to_m, usual_mps in stretches:
+        on_it_m = np.clip(start_m + way_m, from_m, to_m) - from_m
+        total_s += on_it_m / np.minimum(usual_mps, top_mps)
+    first_mps = np.minimum(stretches[0][2], top_mps)
+    away_mps = first_mps - entry_mps
+    return total_s + np.sign(away_mps) * away_mps**2 / (2.0 * FREE_MPS2 * first_mps)
+
+
+def speeds_along(scenario: Scenario, on_ramp: bool) -> list[tuple[float, float, float]]:
+    """Returns stretches of a road (m), and how fast vehicles usually drive on each (m/s).
+
+    On coramp's own roads that is v0 or v_R0; in a network its limits bind as well.
+    """
+    road = scenario.ramp if on_ramp else scenario.mainline
+    if scenario.network is None:
+        return [(road.start_m, math.inf, road.speed_mps)]
+    limits = limits_along(site_of(scenario.network), on_ramp)
+    ends_m = [*limits.from_m[1:], math.inf]
+    v0 = scenario.mainline.speed_mps
+    found = [
+        (max(from_m, road.start_m), to_m, min(limit_mps, v0))
+        for from_m, to_m, limit_mps in zip(limits.from_m, ends_m, limits.limit_mps, strict=True)
+    ]
+    return [stretch for stretch in found if stretch[1] > stretch[0]]

@@ -6,9 +6,10 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray
 
-MARGIN_S, MARGIN_SHARE = 2.0, 0.05
-"""Nobody passes a detector so near to an interval's ends, in s and as a share of it, where there is
-room: drivers take longer or shorter than undisturbed."""
+MARGIN_S, MARGIN_OF_WAY, MARGIN_SHARE = 2.0, 0.15, 0.08
+"""Nobody passes a detector so near to an interval's ends where there is room, in s or as a share of
+the time from the entry, but at most this share of the interval: drivers take longer or shorter than
+undisturbed."""
 FOLLOW_S, STANDSTILL_M = 1.2, 2.5
 """Time gap and gap at rest that SUMO's drivers ask for behind each other, and a bit more."""
 BRAKING_MPS2 = 4.5
@@ -98,7 +99,10 @@ class Clock:
     ) -> tuple[Stream, FloatArray, float, float]:
         """The order and headways that fit, when the first may pass, and how long there is room."""
         shifted = bool(stream.way_s.any())
-        margin_s = min(MARGIN_S, MARGIN_SHARE * (end_s - begin_s)) if shifted else 0.0
+        margin_s = 0.0
+        if shifted:
+            unsure_s = max(MARGIN_S, MARGIN_OF_WAY * float(stream.way_s.max()))
+            margin_s = min(unsure_s, MARGIN_SHARE * (end_s - begin_s))
         ends_s = end_s - max(margin_s, self._step_s)
         tightest = None
         for wish in WISHES:

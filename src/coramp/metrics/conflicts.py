@@ -90,8 +90,8 @@ def _at_lane_changes(
 ) -> tuple[FloatArray, FloatArray]:
     """PET and severity of each neighbour at each lane change onto the mainline."""
     came = np.zeros(len(seen.vehicle), np.bool_)
-    came[1:] = (seen.vehicle[1:] == seen.vehicle[:-1]) & ~seen.on_mainline[:-1]
-    came &= seen.on_mainline
+    came[1:] = (seen.vehicle[1:] == seen.vehicle[:-1]) & (seen.lane[:-1] < 0)
+    came &= seen.lane >= 0
     ahead, behind = came[pairs.rear], came[pairs.front]
     places = np.flatnonzero(ahead | behind)
     pet_s = np.array([_pet_s(seen, pairs, first, k) for k in places.tolist()], np.float64)
@@ -114,7 +114,7 @@ def _pet_s(seen: Seen, pairs: Pairs, first: IntArray, k: int) -> float:
 def _comes(seen: Seen, row: int) -> bool:
     """Whether a vehicle has changed lanes since its row before."""
     same = row > 0 and seen.vehicle[row - 1] == seen.vehicle[row]
-    return bool(same and seen.on_mainline[row] and not seen.on_mainline[row - 1])
+    return bool(same and seen.lane[row] >= 0 and seen.lane[row - 1] < 0)
 
 
 def _passes_s(seen: Seen, first: IntArray, row: int, station_m: float) -> float:

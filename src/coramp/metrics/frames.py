@@ -9,7 +9,7 @@ import polars as pl
 from coramp._kernel import FloatArray, IntArray
 from coramp.coordination.decision_log import DecisionRecord
 from coramp.records.schemas import DECISIONS, TRAJECTORIES, Row, Schema
-from coramp.road.lanes import LANES
+from coramp.road.lanes import lane_name
 
 
 def frame_of(schema: Schema, **columns: Any) -> pl.DataFrame:
@@ -26,7 +26,7 @@ def trajectories_table(
     return frame_of(
         TRAJECTORIES,
         vehicle_id=[name for name, n in zip(names, counts, strict=True) for _ in range(n)],
-        lane=[LANES[code] for code in lane],
+        lane=[lane_name(code) for code in lane.tolist()],
         time_s=rows[:, 0],
         station_m=rows[:, 1],
         speed_mps=rows[:, 2],

@@ -5,16 +5,17 @@ from coramp.metrics.separations import LaneUse
 from coramp.records.outcome import Outcome
 
 
-def lane_uses(outcome: Outcome, traits: FloatArray) -> tuple[LaneUse, LaneUse]:
-    """Returns who used the mainline, and who the ramp with its acceleration lane.
+def lane_uses(outcome: Outcome, traits: FloatArray) -> list[LaneUse]:
+    """Returns who used each lane of the mainline, and at last who the ramp.
 
-    ``traits`` has one row per vehicle.
+    The mainline's begin with the one next to the ramp, whose acceleration lane counts as the
+    ramp's. ``traits`` has one row per vehicle.
     """
-    return _use(outcome, traits, mainline=True), _use(outcome, traits, mainline=False)
+    return [_use(outcome, traits, lane) for lane in outcome.lanes.lanes]
 
 
-def _use(outcome: Outcome, traits: FloatArray, mainline: bool) -> LaneUse:
-    stays, driven = outcome.lanes.on(mainline), outcome.driven
+def _use(outcome: Outcome, traits: FloatArray, lane: int) -> LaneUse:
+    stays, driven = outcome.lanes.in_lane(lane), outcome.driven
     return LaneUse(
         stays.vehicle,
         driven.first,

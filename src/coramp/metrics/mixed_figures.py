@@ -78,8 +78,8 @@ def _seen(outcome: Outcome, automated: BoolArray) -> Seen:
     passages, driven = outcome.passages, outcome.driven
     vehicle = np.repeat(np.arange(len(passages)), np.diff(driven.first))
     time_s, station_m, speed_mps, _ = driven.rows.T
-    on_mainline = outcome.lane == MAINLINE
-    return Seen(vehicle, time_s, station_m, speed_mps, on_mainline, passages.length_m, automated)
+    lane = np.maximum(outcome.lane - MAINLINE, -1)  # all that is no mainline is the ramp's
+    return Seen(vehicle, time_s, station_m, speed_mps, lane, passages.length_m, automated)
 
 
 def _conflicts(outcome: Outcome, scenario: Scenario) -> Row:

@@ -33,14 +33,15 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     ``max_decel_mps2`` is the hardest of anyone and positive. For drivers it is what SUMO reported
     step by step: a vehicle that SUMO stops where it can go no further has all its speed in a step.
     """
-    mainline, ramp = _extremes_of_lanes(outcome, scenario)
-    margin_m, equation = _least_margin(mainline, ramp)
+    lanes = _extremes_of_lanes(outcome, scenario)
+    mainline = lanes[0]  # there the ramp merges
+    margin_m, equation = _least_margin(mainline, min(float(lane[MARGIN]) for lane in lanes))
     return {
         "collisions": outcome.collisions,
-        "safety_violations": int(mainline[VIOLATION_COUNT] + ramp[VIOLATION_COUNT]),
+        "safety_violations": int(sum(lane[VIOLATION_COUNT] for lane in lanes)),
         "min_margin_m": _finite(margin_m),
-        "min_ttc_s": _finite(min(mainline[TTC], ramp[TTC])),
-        "max_drac_mps2": float(max(mainline[DRAC], ramp[DRAC])),
+        "min_ttc_s": _finite(min(lane[TTC] for lane in lanes)),
+        "max_drac_mps2": float(max(lane[DRAC] for lane in lanes)),
         "max_severity": float(mainline[SEVERITY]),
         "max_decel_mps2": float(hardest_braking_mps2(outcome.pieces.rows)),
         "max_jerk_mps3": _largest_jerk_mps3(outcome),
@@ -50,13 +51,14 @@ def safety_figures(outcome: Outcome, scenario: Scenario) -> Row:
     }
 
 
-def _least_margin(mainline: FloatArray, ramp: FloatArray) -> tuple[float, int | None]:
+def _least_margin(mainline: FloatArray, following_m: float) -> tuple[float, int | None]:
     """Returns the least margin (m) over Eq. 1, or over 15 or 16 where one of these is broken.
 
-    With it comes the number of the equation, None where no two vehicles met.
+    ``following_m`` is the former, of all lanes. With it comes the number of the equation, None
+    where no two vehicles met.
     """
     by_equation = {
-        1: min(mainline[MARGIN], ramp[MARGIN]),
+        1: following_m,
         15: min(mainline[MERGE_FRONT], 0.0),
         16: min(mainline[MERGE_REAR], 0.0),
     }
@@ -72,7 +74,7 @@ def _largest_jerk_mps3(outcome: Outcome) -> float:
 
 
 def _extremes_of_lanes(outcome: Outcome, scenario: Scenario, room: int = 0) -> list[FloatArray]:
-    """What ``lane_extremes`` finds on the mainline and on the ramp."""
+    """What ``lane_extremes`` finds on each lane of the mainline, and on the ramp."""
     rules = scenario.rules()
     return [
         lane_extremes(lane, rules.road.merge_angle_rad, rules.safety, room)

@@ -106,6 +106,22 @@ def may_change_lane(
     """
     if users.on_mainline[own] or users.station_m[own] < READY_M:
         return False
+    return may_be_between(users, own, around, ahead, slowest_mps, laws)
+
+
+@kernel
+def may_be_between(
+    users: RoadUsers,
+    own: int,
+    around: Neighbours,
+    ahead: Ahead,
+    slowest_mps: float,
+    laws: OnBoardLaws,
+) -> bool:
+    """Returns whether all distances are kept once a vehicle is between those beside it.
+
+    The same as for ``may_change_lane``, wherever the vehicle comes from.
+    """
     front, rear = around.front[own], around.rear[own]
     if front >= 0 and not _may_be_behind(users, own, front, own, ahead, laws):
         return False

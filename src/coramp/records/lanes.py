@@ -10,24 +10,39 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 
+NO_MAINLINE = -1
+"""The number of the ramp with its acceleration lane."""
+
 
 class LaneHistory(NamedTuple):
     """Stays, one entry each: a vehicle in one lane from when it comes until it leaves.
 
-    ``on_mainline`` is False on the ramp with its acceleration lane. ``from_s`` is nan for a stay
-    that never began. ``merged`` tells that it began with a change of lanes onto the mainline. A
-    vehicle may come to a lane more than once.
+    ``lane`` is that of the mainline, 0 next to the ramp, or -1 on the ramp with its acceleration
+    lane. ``from_s`` is nan for a stay that never began. ``merged`` tells that it began with a
+    change of lanes from the ramp onto the mainline. A vehicle may come to a lane more than once.
     """
 
     vehicle: IntArray
-    on_mainline: BoolArray
+    lane: IntArray
     from_s: FloatArray
     until_s: FloatArray
     merged: BoolArray
 
+    @property
+    def lanes(self) -> list[int]:
+        """All lanes of the history, those of the mainline first, from the one next to the ramp."""
+        found = sorted({0, *self.lane.tolist()} - {NO_MAINLINE})
+        return [*found, NO_MAINLINE]
+
     def on(self, mainline: bool) -> "LaneHistory":
         """Returns the stays on the mainline alone, or all others."""
-        chosen = self.on_mainline if mainline else ~self.on_mainline
+        return self._chosen((self.lane > NO_MAINLINE) == mainline)
+
+    def in_lane(self, lane: int) -> "LaneHistory":
+        """Returns the stays in one lane alone."""
+        return self._chosen(self.lane == lane)
+
+    def _chosen(self, chosen: BoolArray) -> "LaneHistory":
         return LaneHistory._make(column[chosen] for column in self)
 
 
@@ -42,7 +57,7 @@ def planned_history(
     until_s = np.where(np.isnan(entry_s), np.nan, until_s)
     return LaneHistory(
         np.concatenate([vehicles, vehicles]),
-        np.repeat([True, False], len(vehicles)),
+        np.repeat([0, NO_MAINLINE], len(vehicles)),
         np.concatenate([np.where(on_ramp, merge_s, entry_s), np.where(on_ramp, entry_s, np.nan)]),
         np.concatenate([until_s, np.where(np.isnan(merge_s), until_s, merge_s)]),
         np.concatenate([on_ramp, np.zeros(len(vehicles), np.bool_)]),
@@ -50,7 +65,7 @@ def planned_history(
 
 
 def seen_history(
-    vehicle: IntArray, on_mainline: BoolArray, time_s: FloatArray, until_s: FloatArray
+    vehicle: IntArray, lane: IntArray, time_s: FloatArray, until_s: FloatArray
 ) -> LaneHistory:
     """Returns the history of vehicles from where they were seen, by vehicle and time.
 
@@ -58,16 +73,17 @@ def seen_history(
     mainline stands some drivers overtake on the acceleration lane, and so change lanes again.
     """
     same = vehicle[1:] == vehicle[:-1]
-    begins = np.append(True, ~same | (on_mainline[1:] != on_mainline[:-1]))[: len(vehicle)]
+    begins = np.append(True, ~same | (lane[1:] != lane[:-1]))[: len(vehicle)]
     starts = np.flatnonzero(begins)
     whose = vehicle[starts]
     again = np.append(False, whose[1:] == whose[:-1])[: len(starts)]
     goes_on = np.append(again[1:], False)[: len(starts)]
     next_s = np.append(time_s[starts[1:]], np.nan)[: len(starts)]
     to_s = np.where(goes_on, next_s, until_s[whose])
-    return LaneHistory(
-        whose, on_mainline[starts], time_s[starts], to_s, again & on_mainline[starts]
-    )
+    begun = lane[starts]
+    merged = again & (begun > NO_MAINLINE)
+    merged &= np.append(False, begun[:-1] == NO_MAINLINE)[: len(starts)]
+    return LaneHistory(whose, begun, time_s[starts], to_s, merged)
 
 
 def first_on_mainline_s(history: LaneHistory, vehicles: int) -> FloatArray:

@@ -22,7 +22,7 @@ SUMO_DETECTORS, SUMO_DETECTED, DETECTED = "detectors.add.xml", "detectors.xml", 
 """The scenario's detectors, what SUMO wrote of them, and the same as counts."""
 SUMO_FILES = (
     *SUMO_COPIES,
-    *(SUMO_NETWORK, SUMO_COMMAND, SUMO_LOOPS),
+    *(SUMO_NETWORK, f"{SUMO_NETWORK}.gz", SUMO_COMMAND, SUMO_LOOPS),
     *(SUMO_DETECTORS, SUMO_DETECTED, DETECTED),
 )
 """What it may hold."""

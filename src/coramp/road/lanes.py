@@ -4,3 +4,11 @@ LANES = ("ramp", "acceleration", "mainline")
 """Names of the lanes, in the order of their codes: before the nose, beside and on the mainline."""
 RAMP, ACCELERATION_LANE, MAINLINE = range(len(LANES))
 """Codes of the lanes: where pieces lie, and how far a vehicle's merge has come."""
+
+
+def lane_name(code: int) -> str:
+    """Returns the name of a lane by its code; beyond the last are the mainline's lanes further in.
+
+    ``mainline`` is the lane next to the ramp, ``mainline 2`` the one beside it.
+    """
+    return LANES[code] if code <= MAINLINE else f"{LANES[MAINLINE]} {code - MAINLINE + 1}"

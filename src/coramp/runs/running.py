@@ -94,8 +94,9 @@ class RunSpec:
     def is_mixed(self) -> bool:
         """Whether a strategy coordinates automated vehicles among drivers."""
         coordinates = strategy_named(self.strategy).cooperative
-        other = self.scenario.is_mixed or self.scenario.has_faults
-        return coordinates and other and self.scenario.has_automated
+        scenario = self.scenario
+        other = scenario.is_mixed or scenario.has_faults or not scenario.has_one_lane
+        return coordinates and other and scenario.has_automated
 
     @property
     def settings(self) -> str | None:
@@ -157,7 +158,7 @@ def make_spec(
     if is_metered(chosen) and loaded.signal_problem:
         raise CorampError(loaded.signal_problem)
     population = None
-    among_drivers = loaded.is_mixed or loaded.has_faults
+    among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
     if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
     if among_drivers or (loaded.gives_shares and not chosen.cooperative):

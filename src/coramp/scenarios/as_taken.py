@@ -15,6 +15,7 @@ from coramp.scenarios.world_sections import TABLES as OF_THE_WORLD
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
 TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation", "traffic")
+HORIZON = "simulation.horizon_s"
 SHARES = ("mainline_automated_share", "ramp_automated_share")
 FOLLOWS, DEFAULT = "follows from", "default"
 SOURCES = {
@@ -73,7 +74,9 @@ def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
             elif value is None:
                 continue
             elif key == "flow_veh_h":
-                why = "of the list of arrivals"
+                why = "of the demand" if scenario.demand else "of the list of arrivals"
+            elif f"{table}.{key}" == HORIZON and scenario.demand:
+                why = f"{FOLLOWS} the end of the demand"
             else:
                 why = _from(f"{table}.{key}") if field.is_required() else DEFAULT
             yield Taken(f"{table}.{key}", value, why)
@@ -131,7 +134,8 @@ def as_toml(name: str) -> str:
             lines += ["", f"[{table}]"]
         notes = [note for note in (_in_kmh(plain, value), why) if note]
         follows = why is not None and why.startswith(FOLLOWS)
-        commented = "# " if follows or (plain == "flow_veh_h" and scenario.arrivals) else ""
+        listed = plain == "flow_veh_h" and (scenario.arrivals or scenario.demand)
+        commented = "# " if follows or listed else ""
         comment = f"  # {', '.join(notes)}" if notes else ""
         lines.append(f"{commented}{plain} = {_text(value)}{comment}")
     common = [n for n in scenario.drivers if n in populations()]
@@ -142,7 +146,19 @@ def as_toml(name: str) -> str:
         lines.append(f"# drivers of its own: {', '.join(own)}")
     if scenario.arrivals:
         lines.append(f"# [[arrivals]]: {len(scenario.arrivals)} vehicles, listed in the file")
+    lines += _demand_and_detectors(scenario)
     return "\n".join(lines) + "\n"
+
+
+def _demand_and_detectors(scenario: Scenario) -> Iterator[str]:
+    """What there is of tables that are lists, or refer to a file."""
+    if scenario.counts is not None:
+        yield f"# [counts]: {scenario.counts.file}, at {scenario.counts.mainline} and "
+        yield f"#   {scenario.counts.ramp}, which amounts to the flows above"
+    elif scenario.demand:
+        yield f"# [[demand]]: {len(scenario.demand)} parts, listed in the file"
+    if scenario.detector:
+        yield f"# [[detector]]: {', '.join(d.id for d in scenario.detector)}, listed in the file"
 
 
 def _in_kmh(key: str, value: Any) -> str:

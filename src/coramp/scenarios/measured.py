@@ -52,7 +52,7 @@ def with_counts(data: Mapping[str, Any], label: str, origins: Mapping[str, str])
         raise CorampError(f"{blamed}: demand: beside [counts]; allowed is one of the two")
     source = validated(_OnlyCounts, {COUNTS: data[COUNTS]}, label, origins).counts
     path = Path(source.file) if FILE in origins else Path(label).parent / source.file
-    digest = _digest(path)
+    digest = digest_of(path)
     if source.sha256 not in (None, digest):
         raise CorampError(
             f"{blamed}: counts.sha256: {path} has changed since: its hash is {digest}; "
@@ -63,7 +63,8 @@ def with_counts(data: Mapping[str, Any], label: str, origins: Mapping[str, str])
     return {**data, COUNTS: {**data[COUNTS], "sha256": digest}, DEMAND: parts}
 
 
-def _digest(path: Path) -> str:
+def digest_of(path: Path) -> str:
+    """Returns the hash of a file; raises CorampError where it cannot be read."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,10 @@ import tomli_w
 from coramp.errors import CorampError
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
+from coramp.scenarios.counted import path_from
 from coramp.scenarios.defaults import with_defaults, with_populations
+from coramp.scenarios.demand_flows import with_demand_flows
+from coramp.scenarios.measured import COUNTS, with_counts
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.network_section import sha256_of
 from coramp.scenarios.of_ramp import reason_against, scenario_data
@@ -30,8 +34,8 @@ OSM_OPTIONS = (
 """What SUMO's documentation recommends for networks of OpenStreetMap with motorways."""
 
 
-def new_scenario_text(name: str, network: Path, ramp_id: str, beside: Path) -> str:
-    """Returns the TOML text of a scenario of an on-ramp; paths count from the folder ``beside``.
+def new_scenario_data(network: Path, ramp_id: str, beside: Path) -> dict[str, Any]:
+    """Returns the content of a scenario of an on-ramp; paths count from the folder ``beside``.
 
     Raises CorampError where there is no such ramp, or coramp cannot drive there.
     """
@@ -42,27 +46,37 @@ def new_scenario_text(name: str, network: Path, ramp_id: str, beside: Path) -> s
         raise CorampError(f"{network}: {error}") from error
     if reason := reason_against(site):
         raise CorampError(f"{network}: {ramp_id} cannot be coordinated: {reason}")
-    data: dict[str, Any] = {"name": name, **scenario_data(site)}
+    data: dict[str, Any] = scenario_data(site)
     data["network"] = {
-        "file": _path_from(network, beside),
+        "file": path_from(network, beside),
         "sha256": sha256_of(network),
         "ramp": ramp_id,
     }
     lanes = data["mainline"]["lanes"]
     data["mainline"]["flow_veh_h"] = MODERATE_LANE_VEH_H * lanes
     data["ramp"]["flow_veh_h"] = MODERATE_RAMP_VEH_H
-    validated(Scenario, with_defaults(with_populations(data), name), name)
-    ordered = {key: data[key] for key in ("name", "description", "network", "mainline", "ramp")}
-    return f"# {HEAD}\n{tomli_w.dumps(ordered)}"
+    return data
 
 
 HEAD = "Lengths, lanes and limits are those of the network; set the flows and what else you need."
+COUNTED = "The demand is that of the counts; detectors and shares of types follow from them."
+FIRST = ("name", "description", "network", "mainline", "ramp")
 
 
-def _path_from(network: Path, beside: Path) -> str:
-    """The path of a network from a folder where it lies inside, else the whole path."""
-    whole, folder = network.absolute(), beside.absolute()
-    return str(whole.relative_to(folder)) if whole.is_relative_to(folder) else str(whole)
+def new_scenario_text(data: Mapping[str, Any], target: Path) -> str:
+    """Returns the TOML text of a scenario's content, for a file; what it leaves out is as usual.
+
+    Raises CorampError where it is no valid scenario.
+    """
+    data = {"name": target.stem, **data}
+    label = str(target)
+    complete = with_demand_flows(with_counts(with_populations(data), label, {}), label, {})
+    validated(Scenario, with_defaults(complete, label), label)
+    keys = [*(key for key in FIRST if key in data), *(key for key in data if key not in FIRST)]
+    heads = [HEAD] if "network" in data else []
+    heads += [COUNTED] if COUNTS in data else []
+    comments = "".join(f"# {head}\n" for head in heads)
+    return f"{comments}{tomli_w.dumps({key: data[key] for key in keys})}"
 
 
 def osm_network_beside(osm: Path, scenario: Path) -> Path:

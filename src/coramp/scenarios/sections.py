@@ -181,6 +181,11 @@ class DriverPopulation(Model):
     origin: str = ""
 
     @property
+    def highest_factor(self) -> float:
+        """The highest factor of the common speed that a driver may wish, 1 without factors."""
+        return 1.0 if self.speed_factor is None else self.speed_factor.high
+
+    @property
     def taus_s(self) -> tuple[float, ...]:
         """The time gaps that drivers keep, equally likely."""
         return self.tau_s if isinstance(self.tau_s, tuple) else (self.tau_s,)

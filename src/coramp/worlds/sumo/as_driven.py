@@ -35,16 +35,14 @@ def outcome_as_driven(
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
     end_s = float(np.max(exit_s, initial=0.0)) if left else cap_s
-    lanes = seen_history(
-        samples.vehicle, samples.on_mainline, samples.time_s, until_s(exit_s, end_s)
-    )
+    lanes = seen_history(samples.vehicle, samples.lane, samples.time_s, until_s(exit_s, end_s))
     merge_s = first_on_mainline_s(lanes, len(arrivals))
     merge_s[[not arrival.on_ramp for arrival in arrivals]] = BY_MAINLINE_S
     return Outcome(
         cooperative=False,
         passages=passages_of(arrivals, step_s, entry_s, merge_s, exit_s, no_plan),
         pieces=Pieces(first, rows),
-        lane=np.where(samples.on_mainline, MAINLINE, RAMP),
+        lane=np.where(samples.on_mainline, MAINLINE + samples.lane, RAMP),
         driven=Pieces(first, rows),
         lanes=lanes,
         end_s=end_s,

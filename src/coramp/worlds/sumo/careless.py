@@ -12,7 +12,8 @@ from coramp.demand.generators import generator
 from coramp.mixed.users import RoadUsers
 from coramp.scenarios.model import Scenario
 from coramp.worlds.faults.brakings import due_s
-from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan
+from coramp.worlds.sumo.lanes import LanedRoad
+from coramp.worlds.sumo.network import RAMP_LANE, RoadPlan
 from coramp.worlds.sumo.session import Session
 
 STOPS_MPS2, STOPS_AT_MOST_MPS2 = 3.0, 4.0
@@ -184,11 +185,11 @@ class CarelessDrivers:
     def __init__(
         self,
         careless: Careless,
-        plan: RoadPlan,
+        plan: RoadPlan | LanedRoad,
         arrivals: Sequence[Arrival],
     ) -> None:
         self._careless = careless
-        self._lane_starts_m = plan.lane_starts_m()
+        self._spans = plan.spans()
         self._number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
 
     @property
@@ -210,12 +211,14 @@ class CarelessDrivers:
         """Krauss' automated vehicles take no commands: to who breaks down they are as drivers."""
         names, lanes, position_m, speed_mps = self._careless.session.everyone()
         number = np.array([self._number[name] for name in names], np.int64)
-        start_m = np.array([self._lane_starts_m[lane] for lane in lanes], np.float64)
+        spans = [self._spans[lane] for lane in lanes]
+        start_m = np.array([span.start_m for span in spans], np.float64)
+        per_m = np.array([span.per_m for span in spans], np.float64)
         return Road(
             names,
             number,
-            start_m + np.array(position_m, np.float64),
+            start_m + np.array(position_m, np.float64) * per_m,
             np.array(speed_mps, np.float64),
-            np.array([lane not in RAMP_LANES for lane in lanes], np.bool_),
+            np.array([span.lane > RAMP_LANE for span in spans], np.bool_),
             np.zeros(len(names), np.bool_),
         )

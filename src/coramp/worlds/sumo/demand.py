@@ -9,6 +9,7 @@ from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation, Vehicle
 from coramp.vehicles.traits import CAR
+from coramp.worlds.sumo.lanes import LanedRoad
 from coramp.worlds.sumo.traits import DriverTraits
 
 KRAUSS = 'sigma="0"'
@@ -91,10 +92,12 @@ def driver_routes(
     traits: Sequence[DriverTraits],
     metered: bool = False,
     automated: Automated | None = None,
+    road: LanedRoad | None = None,
 ) -> str:
     """Returns the route file of an uncontrolled run with a population of drivers.
 
-    Who is ``automated`` has a type of its own.
+    Who is ``automated`` has a type of its own. On a ``road`` of several lanes each enters on its
+    own, no faster than the limits there let it.
 
     Drivers who wish their entry speed get a type of their own each, by ``maxSpeed``. Drivers who
     wish free flow take v_R0 from the ramp's limit, and v0 from ``maxSpeed`` or, with a speed
@@ -110,7 +113,7 @@ def driver_routes(
                 allowed_mps = min(allowed_mps, scenario.ramp.speed_mps)
             entry_mps = min(arrival.speed_mps, allowed_mps)
             types[name] = line
-            vehicles.append(_vehicle(arrival, name, entry_mps, scenario.control.step_s))
+            vehicles.append(_vehicle(arrival, name, entry_mps, scenario.control.step_s, None, road))
             continue
         if drivers.wish == "entry-speed":
             wish_mps = entry_mps = arrival.speed_mps
@@ -120,6 +123,11 @@ def driver_routes(
             common_mps = scenario.ramp.speed_mps if arrival.on_ramp else wish_mps
             entry_mps = min(arrival.speed_mps, common_mps * (own.speed_factor or 1.0))
             name = f"driver-{arrival.length_m!r}"
+            if road is not None:
+                limit_mps = max(road.mainline.limits.limit_mps)
+                if own.speed_factor is not None and wish_mps < limit_mps:
+                    wish_mps *= own.speed_factor / drivers.highest_factor
+                    name += f"-{arrival.vehicle_id}"
             if len(drivers.taus_s) > 1:
                 name += f"-{own.tau_s!r}"
         if arrival.traits is not None and not math.isinf(arrival.traits.top_speed_mps):
@@ -131,8 +139,12 @@ def driver_routes(
         manners = f"{_manners(drivers, own)}{_ability(drivers, arrival)}{_grip(scenario, arrival)}"
         types[name] = f'  <vType id="{name}" {size} {manners}{_class(scenario, arrival)}/>'
         vehicles.append(
-            _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor)
+            _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor, road)
         )
+    if road is not None:
+        ways = (("mainline", road.mainline), ("ramp", road.ramp))
+        routes = [f'  <route id="{name}" edges="{" ".join(way.edges)}"/>' for name, way in ways]
+        return _text(list(types.values()), routes, vehicles)
     return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
 
 
@@ -230,15 +242,31 @@ def _changes(drivers: DriverPopulation) -> str:
 
 
 def _vehicle(
-    arrival: Arrival, kind: str, speed_mps: float, step_s: float, speed_factor: float | None = None
+    arrival: Arrival,
+    kind: str,
+    speed_mps: float,
+    step_s: float,
+    speed_factor: float | None = None,
+    road: LanedRoad | None = None,
 ) -> str:
     route = "ramp" if arrival.on_ramp else "mainline"
+    lane = ""
     factor = "" if speed_factor is None else f' speedFactor="{speed_factor!r}"'
+    if road is not None:
+        way = road.way(arrival.on_ramp)
+        lane = f' departLane="{way.lane + arrival.lane}"'
+        allowed_mps = way.limits.allowed_mps(way.limits.from_m[0])
+        speed_mps = min(speed_mps, allowed_mps * min(1.0, speed_factor or 1.0))
     return (
         f'  <vehicle id="{arrival.vehicle_id}" type="{kind}" route="{route}" '
-        f'depart="{arrival.step * step_s:.3f}" departPos="0" departSpeed="{speed_mps!r}"{factor}/>'
+        f'depart="{arrival.step * step_s:.3f}"{lane} departPos="0" '
+        f'departSpeed="{speed_mps!r}"{factor}/>'
     )
 
 
 def _file(types: Sequence[str], vehicles: Sequence[str], ramp: str = "ramp") -> str:
-    return "\n".join(["<routes>", *types, ROUTES.format(ramp=ramp), *vehicles, "</routes>", ""])
+    return _text(types, [ROUTES.format(ramp=ramp)], vehicles)
+
+
+def _text(types: Sequence[str], routes: Sequence[str], vehicles: Sequence[str]) -> str:
+    return "\n".join(["<routes>", *types, *routes, *vehicles, "</routes>", ""])

@@ -18,15 +18,16 @@ from coramp.scenarios.sections import DriverPopulation
 from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.detectors import counted, loops_file, loops_of
 from coramp.worlds.sumo.files import PLAIN_OPTIONS
-from coramp.worlds.sumo.network import driver_road_plan, network_file, sumo_binary
+from coramp.worlds.sumo.lanes import LanedRoad, road_of
+from coramp.worlds.sumo.network import sumo_binary
 from coramp.worlds.sumo.traits import traits_of
 
-ROUTES = "routes.rou.xml"
+ROUTES, CLOSED = "routes.rou.xml", "closed.add.xml"
 
 
 def build_network(scenario: Scenario, drivers: DriverPopulation) -> None:
     """Builds the network of a run, which is kept for later ones: once, before threads need it."""
-    network_file(driver_road_plan(scenario, drivers))
+    _ = road_of(scenario, drivers).file
 
 
 def detected(scenario: Scenario, drivers: DriverPopulation, seed: int) -> pl.DataFrame:
@@ -35,16 +36,22 @@ def detected(scenario: Scenario, drivers: DriverPopulation, seed: int) -> pl.Dat
     Arrivals and drivers are those of an uncontrolled run with that seed, cars without automation.
     Raises CorampError where SUMO fails.
     """
-    plan, arrivals = driver_road_plan(scenario, drivers), arrivals_of(scenario, seed)
-    routes = driver_routes(scenario, drivers, arrivals, traits_of(drivers, arrivals, seed))
-    loops = loops_of(scenario, plan, arrivals, routes)
+    road, arrivals = road_of(scenario, drivers), arrivals_of(scenario, seed)
+    laned = road if isinstance(road, LanedRoad) else None
+    traits = traits_of(drivers, arrivals, seed)
+    routes = driver_routes(scenario, drivers, arrivals, traits, road=laned)
+    loops = loops_of(scenario, road, arrivals, routes)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         folder = Path(name)
         (folder / ROUTES).write_text(routes)
         (folder / SUMO_DETECTORS).write_text(loops_file(loops))
+        additional = [SUMO_DETECTORS]
+        if road.additional is not None:
+            (folder / CLOSED).write_text(road.additional)
+            additional.append(CLOSED)
         command = [
-            *(sumo_binary("sumo"), "--net-file", str(network_file(plan))),
-            *("--route-files", ROUTES, "--additional-files", SUMO_DETECTORS),
+            *(sumo_binary("sumo"), "--net-file", str(road.file)),
+            *("--route-files", ROUTES, "--additional-files", ",".join(additional), *road.options),
             *("--seed", str(seed), *PLAIN_OPTIONS, "--no-warnings", "true"),
             *("--step-length", repr(scenario.control.step_s)),
             *("--end", repr(scenario.simulation.horizon_s)),

@@ -14,8 +14,10 @@ from coramp.records.run_folder import SUMO_DETECTED
 from coramp.scenarios.demand_sections import Detector
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.demand import cooperative_type
-from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan
+from coramp.worlds.sumo.lanes import LanedRoad
+from coramp.worlds.sumo.network import RAMP_LANE, RoadPlan
 
+Road = RoadPlan | LanedRoad
 VEHICLE = re.compile(r'<vehicle id="([^"]+)" type="([^"]+)"')
 
 
@@ -33,7 +35,7 @@ class Loop(NamedTuple):
 
 
 def loops_of(
-    scenario: Scenario, plan: RoadPlan, arrivals: Sequence[Arrival], routes: str
+    scenario: Scenario, road: Road, arrivals: Sequence[Arrival], routes: str
 ) -> list[Loop]:
     """Returns a loop for each detector, lane and type of vehicles of a scenario.
 
@@ -47,25 +49,30 @@ def loops_of(
             lane,
             kind,
             name,
-            detector.station_m - start_m,
+            position_m,
             detector.period_s,
             types,
         )
         for detector in scenario.detector
-        for lane, (name, start_m) in enumerate(lanes_at(plan, detector))
+        for lane, (name, position_m) in enumerate(lanes_at(road, detector))
         for kind, types in of_class.items()
     ]
 
 
-def lanes_at(plan: RoadPlan, detector: Detector) -> list[tuple[str, float]]:
-    """Returns SUMO's lanes of a road at a detector, from the outermost, and their starts (m)."""
-    starts_m = plan.lane_starts_m()
-    return [
-        (lane, starts_m[lane])
-        for lane, length_m in sorted(plan.lane_lengths_m().items())
-        if (lane in RAMP_LANES) == (detector.road == "ramp")
-        and 0.0 <= detector.station_m - starts_m[lane] < length_m
-    ]
+def lanes_at(road: Road, detector: Detector) -> list[tuple[str, float]]:
+    """Returns SUMO's lanes of a road at a detector, from the outermost, and where on them it is.
+
+    That is in m from the lane's start.
+    """
+    ramp = detector.road == "ramp"
+    last: dict[int, tuple[float, str, float]] = {}
+    for name, span in road.spans().items():
+        behind_m = detector.station_m - span.start_m
+        if name.startswith(":") or (span.lane == RAMP_LANE) != ramp or behind_m < 0.0:
+            continue
+        found = (span.start_m, name, behind_m / span.per_m)
+        last[span.lane] = max(found, last.get(span.lane, found))
+    return [last[lane][1:] for lane in sorted(last)]
 
 
 def _types_by_class(
@@ -88,7 +95,7 @@ def loops_file(loops: Sequence[Loop]) -> str:
     """Returns SUMO's file of loops, which write into a file beside it."""
     lines = [
         f'  <inductionLoop id="{loop.name}" lane="{loop.sumo_lane}" pos="{loop.position_m!r}" '
-        f'period="{loop.period_s!r}" file="{SUMO_DETECTED}"'
+        f'period="{loop.period_s!r}" file="{SUMO_DETECTED}" friendlyPos="true"'
         + (f' vTypes="{" ".join(loop.types)}"' if loop.types else "")
         + "/>"
         for loop in loops

@@ -134,7 +134,7 @@ def _as_seen(outcome: Outcome, samples: Samples) -> Outcome:
     first, rows = pieces_of_samples(*samples.motion, vehicles)
     last_s = np.full(vehicles, np.nan)
     last_s[samples.vehicle] = samples.time_s  # the last one of each vehicle stays
-    lanes = seen_history(samples.vehicle, samples.on_mainline, samples.time_s, last_s)
+    lanes = seen_history(samples.vehicle, samples.lane, samples.time_s, last_s)
     return replace(outcome, driven=Pieces(first, rows), lanes=lanes)
 
 

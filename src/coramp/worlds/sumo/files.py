@@ -23,7 +23,8 @@ from coramp.records.run_folder import (
 )
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.detectors import Loop, counted, loops_file, loops_of
-from coramp.worlds.sumo.network import RAMP_LANES, RoadPlan, network_file
+from coramp.worlds.sumo.lanes import LanedRoad
+from coramp.worlds.sumo.network import RAMP_LANE, RoadPlan
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
@@ -33,14 +34,20 @@ COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-juncti
 class Samples:
     """Positions of SUMO's vehicles at its steps, by vehicle and time.
 
-    ``on_mainline`` is False on the ramp and the acceleration lane.
+    ``lane`` is that of the mainline, 0 next to the ramp, or -1 on the ramp and the acceleration
+    lane.
     """
 
     vehicle: IntArray
-    on_mainline: BoolArray
+    lane: IntArray
     time_s: FloatArray
     station_m: FloatArray
     speed_mps: FloatArray
+
+    @property
+    def on_mainline(self) -> BoolArray:
+        """Which are neither on the ramp nor on the acceleration lane."""
+        return np.asarray(self.lane > RAMP_LANE)
 
     @property
     def motion(self) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
@@ -70,7 +77,7 @@ class RunFiles:
         self,
         folder: Path,
         scenario: Scenario,
-        plan: RoadPlan,
+        plan: RoadPlan | LanedRoad,
         seed: int,
         options: SumoOptions,
         ballistic: bool,
@@ -90,6 +97,11 @@ class RunFiles:
     def write_routes(self, text: str) -> None:
         """Writes the route file."""
         (self._folder / "routes.rou.xml").write_text(text)
+
+    def write_additional(self) -> None:
+        """Writes what SUMO is told beside the network, if anything."""
+        if (text := self._plan.additional) is not None:
+            self.write_loops(text)
 
     def write_loops(self, text: str) -> None:
         """Writes the file of loop detectors; without it there are none."""
@@ -113,11 +125,12 @@ class RunFiles:
         """Returns SUMO's options, output files included."""
         folder = self._folder
         result = [
-            *("--net-file", str(network_file(self._plan))),
+            *("--net-file", str(self._plan.file)),
             *("--route-files", str(folder / "routes.rou.xml")),
             *("--seed", str(self._seed), *PLAIN_OPTIONS, *COLLISION_OPTIONS),
             *("--no-warnings", "true", "--collision-output", str(folder / "collisions.xml")),
             *self._loops(folder),
+            *self._plan.options,
         ]
         result += self._step_method
         if self._sampled or self._keep_in is not None:
@@ -142,7 +155,7 @@ class RunFiles:
         if self._keep_in is None:
             return
         self._keep_in.mkdir(parents=True, exist_ok=True)
-        shutil.copy(network_file(self._plan), self._keep_in / SUMO_NETWORK)
+        shutil.copy(self._plan.file, self._keep_in / self._network_name)
         for name in SUMO_COPIES:
             shutil.copy(self._folder / name, self._keep_in / name)
         for name in (SUMO_LOOPS, SUMO_DETECTORS, SUMO_DETECTED):
@@ -152,13 +165,20 @@ class RunFiles:
             counts = counted(self._folder / SUMO_DETECTED, self._detectors)
             write_text(self._keep_in / DETECTED, counts.write_csv())
         command = [
-            *("sumo", "--net-file", SUMO_NETWORK, "--route-files", "routes.rou.xml"),
+            *("sumo", "--net-file", self._network_name, "--route-files", "routes.rou.xml"),
             *("--step-length", repr(self._step_s), "--seed", str(self._seed)),
             *self._loops(),
             *(*PLAIN_OPTIONS, *COLLISION_OPTIONS, "--end", repr(self._cap_s)),
             *self._step_method,
+            *self._plan.options,
         ]
         (self._keep_in / SUMO_COMMAND).write_text(" ".join(command) + "\n")
+
+    @property
+    def _network_name(self) -> str:
+        """A copy's name: a network that is packed stays so."""
+        packed = self._plan.file.name.endswith(".gz")
+        return f"{SUMO_NETWORK}.gz" if packed else SUMO_NETWORK
 
     def collisions(self) -> int:
         """Returns how many pairs of vehicles SUMO saw collide."""
@@ -186,23 +206,25 @@ class RunFiles:
 
     def samples(self, arrivals: Sequence[Arrival]) -> Samples:
         """Returns all positions, by vehicle and time."""
-        starts_m = self._plan.lane_starts_m()
+        spans = self._plan.spans()
         number = {arrival.vehicle_id: k for k, arrival in enumerate(arrivals)}
-        on_mainline = {lane: lane not in RAMP_LANES for lane in starts_m}
+        starts_m = {lane: span.start_m for lane, span in spans.items()}
+        per_m = {lane: span.per_m for lane, span in spans.items()}
+        numbers = {lane: span.lane for lane, span in spans.items()}
         lane = pl.col("vehicle_lane")
         written = pl.read_parquet(self._folder / "fcd.parquet")
         if "vehicle_id" not in written.columns:  # nobody ever drove
             nothing = np.empty(0)
-            return Samples(nothing.astype(np.int64), nothing.astype(np.bool_), *[nothing] * 3)
+            return Samples(*[nothing.astype(np.int64)] * 2, *[nothing] * 3)
         frame = (
             written.lazy()
             .drop_nulls("vehicle_id")
             .select(
                 vehicle=pl.col("vehicle_id").replace_strict(number, return_dtype=pl.Int64),
-                on_mainline=lane.replace_strict(on_mainline, return_dtype=pl.Boolean),
+                lane=lane.replace_strict(numbers, return_dtype=pl.Int64),
                 time_s="timestep_time",
                 station_m=lane.replace_strict(starts_m, return_dtype=pl.Float64)
-                + pl.col("vehicle_pos"),
+                + pl.col("vehicle_pos") * lane.replace_strict(per_m, return_dtype=pl.Float64),
                 speed_mps="vehicle_speed",
             )
             .sort("vehicle", "time_s")

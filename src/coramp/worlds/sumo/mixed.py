@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from coramp.worlds.sumo.as_driven import outcome_as_driven
 from coramp.worlds.sumo.careless import Careless
 from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
+from coramp.worlds.sumo.lanes import LanedRoad, road_of
 from coramp.worlds.sumo.mixed_notes import Notes, notes_of
 from coramp.worlds.sumo.mixed_plant import MixedPlant
 from coramp.worlds.sumo.mixed_setup import (
@@ -33,7 +34,7 @@ from coramp.worlds.sumo.mixed_setup import (
     automated_types,
     laws_of,
 )
-from coramp.worlds.sumo.network import driver_road_plan
+from coramp.worlds.sumo.network import RoadPlan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.traits import traits_of, with_careless
 
@@ -66,7 +67,8 @@ def begun(
     """Starts SUMO, with its files in a folder, and hands over the run; SUMO ends with it."""
     drivers = scenario.drivers[population]
     arrivals = arrivals_of(scenario, seed)
-    plan = driver_road_plan(scenario, drivers)
+    plan = road_of(scenario, drivers)
+    laned = plan if isinstance(plan, LanedRoad) else None
     step_s = scenario.control.step_s
     period_steps = steps_of_period(strategy.decision_s, step_s)
     automated = automated_of(scenario, arrivals, seed)
@@ -74,12 +76,15 @@ def begun(
     traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
     actuators = actuators_of(scenario, len(arrivals))
     types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
-    files.write_routes(driver_routes(scenario, drivers, arrivals, traits, automated=types))
+    files.write_routes(
+        driver_routes(scenario, drivers, arrivals, traits, automated=types, road=laned)
+    )
+    files.write_additional()
     files.write_detectors(arrivals)
     with Session(files.options(), step_s, options.gui, options.tell) as session:
-        plant = MixedPlant(
+        plant = plant_on(
+            plan,
             session,
-            plan.lane_starts_m(),
             Able.of(scenario, arrivals, automated),
             period_steps,
             step_s,
@@ -90,9 +95,27 @@ def begun(
         laws = laws_of(scenario, drivers, plant.period_s, actuators.delay_s)
         air = Air(scenario, heard, automated, seed)
         acts_after_s = scenario.commands.delay_s + actuators.delay_s
-        control = Control(strategy, laws, air, acts_after_s, notes=notes_of(options, air))
+        control = control_of(plant, strategy, laws, air, acts_after_s, notes=notes_of(options, air))
         careless = Careless(scenario, session, seed)
         yield MixedRun(scenario, population, arrivals, files, plant, control, careless)
+
+
+def plant_on(road: RoadPlan | LanedRoad, session: Session, *rest: Any) -> MixedPlant:
+    """Returns the vehicles of a session on a road of one lane or several."""
+    from coramp.worlds.sumo.mixed_lanes import LanedPlant
+
+    if isinstance(road, LanedRoad):
+        return LanedPlant(session, {}, *rest, road=road)
+    return MixedPlant(session, road.lane_starts_m(), *rest)
+
+
+def control_of(plant: MixedPlant, *rest: Any, notes: Notes | None) -> "Control":
+    """Returns the control of a run on a road of one lane or several."""
+    from coramp.worlds.sumo.mixed_lanes import LanedControl, LanedPlant
+
+    if isinstance(plant, LanedPlant):
+        return LanedControl(*rest, notes=notes, plant=plant)
+    return Control(*rest, notes=notes)
 
 
 class Moment(NamedTuple):

@@ -123,11 +123,15 @@ class MixedPlant:
                 self._changing.discard(int(users.number[i]))
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
-            self.session.change_lane_now(names[i], 1, self.period_steps)
+            self._change_lane(names[i])
             self._changing.add(int(users.number[i]))
         chosen = [names[i] for i in own.tolist()]
         self._sent_m[number], self._sent_mps[number] = users.station_m[own], users.speed_mps[own]
         self._drive(chosen, number, accel_mps2[own])
+
+    def _change_lane(self, name: str) -> None:
+        """Has a vehicle on the acceleration lane change to the mainline beside it."""
+        self.session.change_lane_now(name, 1, self.period_steps)
 
     def _drive(self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray) -> None:
         """Drives a period: at once with these accelerations, or step by step as the lag has it."""

@@ -3,7 +3,7 @@
 Edges are ``mainline`` and ``ramp`` up to station 0, ``merge`` along the acceleration lane and
 ``downstream`` behind it. The acceleration lane (lane 0 of ``merge``) is a dead end, so that merging
 is a lane change. x is the mainline's station. Where the ramp is metered, ``ramp`` ends at the stop
-line and ``gore`` leads on from there.
+line and ``gore`` leads on from there. The mainline has one lane or several.
 """
 
 import atexit
@@ -16,6 +16,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import sumo
 
@@ -25,6 +26,9 @@ from coramp.scenarios.sections import DriverPopulation
 
 LANE_WIDTH_M = 3.2
 RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})
+RAMP_LANE = -1
+"""The number of the ramp and its acceleration lane; those of the mainline count from 0 on."""
+MADE_RAMP = "ramp@merge"
 JUNCTION_LENGTH_M = 0.001
 """What SUMO's lanes inside a node take from a vehicle's way; less than it prints."""
 LENGTH_TOLERANCE_M = 0.002
@@ -33,6 +37,19 @@ LENGTH_TOLERANCE_M = 0.002
 def sumo_binary(name: str) -> str:
     """Returns the path of a program of the installed SUMO."""
     return str(Path(sumo.SUMO_HOME) / "bin" / name)
+
+
+class LaneSpan(NamedTuple):
+    """Where one of SUMO's lanes lies: the station at which it begins, and metres of station a metre.
+
+    ``lane`` is its number: that of the mainline, 0 next to the ramp, or ``RAMP_LANE``. ``changes``
+    tells that a vehicle can change from it to the next lane of the mainline further in.
+    """
+
+    start_m: float
+    per_m: float
+    lane: int
+    changes: bool
 
 
 @dataclass(frozen=True)
@@ -47,6 +64,29 @@ class RoadPlan:
     ramp_limit_mps: float
     merge_angle_deg: float
     gore_m: float = 0.0
+    lanes: int = 1
+
+    @property
+    def file(self) -> Path:
+        """The network's file."""
+        return network_file(self)
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """SUMO's options for this network: none."""
+        return ()
+
+    @property
+    def additional(self) -> str | None:
+        """What SUMO is told beside the network: nothing."""
+        return None
+
+    def spans(self) -> dict[str, LaneSpan]:
+        """Returns where each lane lies on a road of one mainline lane, as ``lane_starts_m``."""
+        return {
+            lane: LaneSpan(start_m, 1.0, RAMP_LANE if lane in RAMP_LANES else 0, lane == "merge_0")
+            for lane, start_m in self.lane_starts_m().items()
+        }
 
     def lane_lengths_m(self) -> dict[str, float]:
         """Returns the length that each lane must have."""
@@ -61,7 +101,10 @@ class RoadPlan:
         return {lane: length_m for lane, length_m in lengths_m.items() if length_m > 0.0}
 
     def lane_starts_m(self) -> dict[str, float]:
-        """Returns the station at which each lane begins; lanes inside nodes included."""
+        """Returns the station at which each lane begins; lanes inside nodes included.
+
+        That is of a road of one mainline lane.
+        """
         return {
             "mainline_0": -self.mainline_m,
             "ramp_0": -self.ramp_m,
@@ -87,6 +130,7 @@ def road_plan(scenario: Scenario) -> RoadPlan:
         mainline_limit_mps=mainline.limit_mps,
         ramp_limit_mps=ramp.limit_mps,
         merge_angle_deg=ramp.merge_angle_deg,
+        lanes=mainline.lanes,
     )
 
 
@@ -188,15 +232,23 @@ def _nodes(plan: RoadPlan) -> str:
 
 
 def _edges(plan: RoadPlan) -> str:
-    main, edge_y = plan.mainline_limit_mps, LANE_WIDTH_M / 2.0
+    """The edges; the outermost lane of the mainline lies at y = 0, others to its left."""
+    main, edge_y = plan.mainline_limit_mps, LANE_WIDTH_M / 2.0 * plan.lanes
+    end_m = plan.acceleration_lane_m
+    before = behind = 'spreadType="center"'
+    if plan.lanes > 1:
+        edge_y = LANE_WIDTH_M * (plan.lanes - 0.5)
+        west, east = f"{-plan.mainline_m!r},{edge_y}", f"{end_m + plan.downstream_m!r},{edge_y}"
+        before, behind = f'shape="{west} 0,{edge_y}"', f'shape="{end_m!r},{edge_y} {east}"'
+    many = f'numLanes="{plan.lanes}" speed="{main!r}"'
     return f"""<edges>
-  <edge id="mainline" from="west" to="nose" numLanes="1" speed="{main!r}" spreadType="center"/>
+  <edge id="mainline" from="west" to="nose" {many} {before}/>
 {_ramp_edges(plan)}
-  <edge id="merge" from="nose" to="end" numLanes="2" speed="{main!r}"
-        shape="0,{edge_y} {plan.acceleration_lane_m!r},{edge_y}">
+  <edge id="merge" from="nose" to="end" numLanes="{plan.lanes + 1}" speed="{main!r}"
+        shape="0,{edge_y} {end_m!r},{edge_y}">
     <lane index="0" acceleration="1"/>
   </edge>
-  <edge id="downstream" from="end" to="east" numLanes="1" speed="{main!r}" spreadType="center"/>
+  <edge id="downstream" from="end" to="east" {many} {behind}/>
 </edges>"""
 
 
@@ -228,8 +280,17 @@ def _connections(plan: RoadPlan) -> str:
     if plan.gore_m > 0.0:
         ramp = f'  <connection from="ramp" to="gore" fromLane="0" toLane="0" {rest}/>\n'
         onto = "gore"
+    lanes = range(plan.lanes)
+    on = "\n".join(
+        f'  <connection from="mainline" to="merge" fromLane="{k}" toLane="{k + 1}" {rest}/>'
+        for k in lanes
+    )
+    off = "\n".join(
+        f'  <connection from="merge" to="downstream" fromLane="{k + 1}" toLane="{k}" {rest}/>'
+        for k in lanes
+    )
     return f"""<connections>
-  <connection from="mainline" to="merge" fromLane="0" toLane="1" {rest}/>
+{on}
 {ramp}  <connection from="{onto}" to="merge" fromLane="0" toLane="0" {rest}/>
-  <connection from="merge" to="downstream" fromLane="1" toLane="0" {rest}/>
+{off}
 </connections>"""

@@ -23,6 +23,8 @@ OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
 NO_CHANGES = 0
 """Lane change mode without changes of its own, and without checks of those commanded."""
+CLEAR_CHANGES = 256
+"""Lane change mode without changes of its own, in which SUMO refuses those that would collide."""
 DRIVERS_CARE = 31
 """Speed mode of a driver: with all checks."""
 DRIVERS_CHANGES = 1621
@@ -192,6 +194,11 @@ class Session:
         """Commands a lane change in the next step, without SUMO's checks."""
         libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
         libsumo.vehicle.changeLane(vehicle_id, lane, (steps + 1) * self._step_s)
+
+    def change_lane_if_clear(self, vehicle_id: str, lane: int, time_s: float) -> None:
+        """Commands a lane change within a time, but for one into another vehicle."""
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, CLEAR_CHANGES)
+        libsumo.vehicle.changeLane(vehicle_id, lane, time_s)
 
     def everyone(self) -> tuple[list[str], list[str], list[float], list[float]]:
         """Returns who is on the road: names, lanes, positions along them (m), speeds (m/s)."""

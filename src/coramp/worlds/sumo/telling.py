@@ -8,6 +8,7 @@ from coramp._kernel import IntArray
 from coramp.messages.events import Report
 from coramp.messages.log import NO_POSITIONS, Positions
 from coramp.worlds.sumo.cooperative import CooperativePlant
+from coramp.worlds.sumo.network import LaneSpan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.telling import together
 
@@ -56,9 +57,9 @@ def positions_in_sumo(
 class DriversInSumo:
     """Has SUMO's drivers report where they are, when they are asked; ``told`` are their answers."""
 
-    def __init__(self, session: Session, lane_starts_m: Mapping[str, float], step_s: float) -> None:
+    def __init__(self, session: Session, spans: Mapping[str, LaneSpan], step_s: float) -> None:
         self._session = session
-        self._lane_starts_m = lane_starts_m
+        self._spans = spans
         self._step_s = step_s
         self.now_step = 0
         self.told: list[Report] = []
@@ -72,7 +73,7 @@ class DriversInSumo:
         answers = []
         for name in self._session.since_before(at_step):
             lane, position_m = self._session.lane_and_position_m(name)
-            station_m = self._lane_starts_m[lane] + position_m
+            station_m = self._spans[lane].start_m + position_m * self._spans[lane].per_m
             speed_mps = self._session.speed_mps(name)
             answers.append(Report(name, at_step * self._step_s, station_m, speed_mps))
         if not self.told or self.told[-1].time_s < at_step * self._step_s:

@@ -22,8 +22,8 @@ from coramp.worlds.sumo.as_driven import outcome_as_driven
 from coramp.worlds.sumo.careless import Careless, CarelessDrivers
 from coramp.worlds.sumo.demand import KRAUSS, Automated, driver_routes
 from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
+from coramp.worlds.sumo.lanes import LanedRoad, road_of
 from coramp.worlds.sumo.metering import Meter, loops
-from coramp.worlds.sumo.network import driver_road_plan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.telling import DriversInSumo, with_answers
 from coramp.worlds.sumo.traits import traits_of, with_careless
@@ -52,19 +52,23 @@ def run_uncontrolled(
     arrivals = arrivals_of(scenario, seed)
     metered = is_metered(strategy)
     automated = alone_among_drivers(scenario, arrivals, seed)
-    plan = driver_road_plan(scenario, drivers, metered)
+    plan = road_of(scenario, drivers, metered)
+    laned = plan if isinstance(plan, LanedRoad) else None
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = drivers.integrator == "ballistic"
         files = RunFiles(Path(name), scenario, plan, seed, options, ballistic, sampled=True)
         traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
-        files.write_routes(driver_routes(scenario, drivers, arrivals, traits, metered, automated))
+        files.write_routes(
+            driver_routes(scenario, drivers, arrivals, traits, metered, automated, laned)
+        )
+        files.write_additional()
         files.write_detectors(arrivals)
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
         if metered:
             files.write_loops(loops(scenario, look_steps * step_s))
         with Session(files.options(), step_s, options.gui, options.tell) as session:
-            road = DriversInSumo(session, plan.lane_starts_m(), step_s)
+            road = DriversInSumo(session, plan.spans(), step_s)
             meter = Meter(session, step_s) if metered else None
             service = Service(
                 strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
