@@ -1,18 +1,26 @@
 """coramp calibrate: from files to a file of drivers that runs use, and what it refuses."""
 
+import hashlib
 import json
 import tomllib
 
 import polars as pl
 import pytest
 
+from coramp.calibration.calibrate import Calibrated, Effort
+from coramp.calibration.fit import Fit
+from coramp.calibration.free_speed import FreeSpeed
+from coramp.calibration.from_files import Asked, calibrated
 from coramp.calibration.series import capacity_veh_h, series_of
+from coramp.calibration.written import write_population
+from coramp.cli.calibration_listing import calibrated_table
 from coramp.counts.table import SCHEMA
 from coramp.errors import CorampError
 from coramp.runs.running import make_spec
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.population_files import read_population
 from coramp.scenarios.sections import DriverPopulation, SpeedFactor
+from coramp.studies.speed_unit import KMH
 from coramp.worlds.sumo.detected import detected
 from tests.edges import assert_refused, built_in, invoke
 
@@ -62,51 +70,65 @@ def told_by(road, flows, horizon_s, drivers=HIDDEN, seed=5):
 
 
 def broken_down(road):
-    """25 min of data whose merge breaks down after some 10 min."""
-    return told_by(road, ((1000.0, 1800.0), (100.0, 1200.0)), 2100.0)
+    """Data whose merge breaks down after some 15 min."""
+    return told_by(road, ((1200.0, 1700.0), (100.0, 1200.0)), 2400.0)
 
 
 def test_hidden_drivers_are_found_roughly_by_few_runs(road, tmp_path):
-    counts, out = tmp_path / "counts.csv", tmp_path / "found.toml"
+    counts = tmp_path / "counts.csv"
     frame = broken_down(road)
     frame.write_csv(counts)
     measured = capacity_veh_h(series_of(frame), "M2", "M3", FREE_MPS)
     assert measured is not None
-    command = ("calibrate", road, counts, "--runs", 12, "--out", out, "--date", "2026-01-02")
-    told = invoke(*command, "--json")
-    assert told.code == 0, told.err
-    found = json.loads(told.out)
-    assert found["name"] == "found"
-    assert found["free_speed_mps"] == pytest.approx(FREE_MPS, rel=0.03)
-    assert found["drivers"]["speed_factor"]["mean"] == pytest.approx(0.95, rel=0.01)
-    fit = found["fit"]
-    assert fit["capacity_veh_h"][0] == measured
-    assert fit["capacity_veh_h"][1] == pytest.approx(measured, rel=0.1)
-    assert fit["broke_down"] == fit["runs"]
+    told = []
+    effort = Effort(12, 4, 2, speed_runs=1, fit_runs=2, report=lambda *done: told.append(done))
+    found, origin = calibrated(str(road), counts, Asked(date="2026-01-02"), effort)
+    assert told[-1] == (17, 17)
+    assert found.notes == ()
+    assert found.drivers.speed_factor.mean == pytest.approx(0.95, rel=0.015)
+    assert found.fit.capacity_veh_h[0] == measured
+    assert found.fit.capacity_veh_h[1] == pytest.approx(measured, rel=0.12)
+    assert found.fit.broke_down == found.fit.runs == 2
+    out = tmp_path / "found.toml"
+    write_population(found, out, origin)
     written = tomllib.loads(out.read_text())
     name, table = read_population(str(out))
     assert (name, table) == ("found", written["drivers"]["found"])
     assert "calibrated on 2026-01-02 to counts.csv (sha256 " in table["origin"]
-    assert len(written["provenance"]["counts_sha256"]) == 64
-    assert written["provenance"]["runs"] == 12
+    provenance = written["provenance"]
+    assert provenance["counts_sha256"] == hashlib.sha256(counts.read_bytes()).hexdigest()
+    assert provenance["fit"]["measured_capacity_veh_h"] == measured
     spec = make_spec("paper", "uncontrolled", drivers=str(out))
     assert spec.drivers == "found"
-    assert spec.scenario.drivers["found"].tau_s == found["drivers"]["tau_s"]
+    assert spec.scenario.drivers["found"].tau_s == found.drivers.tau_s
 
 
 def test_without_a_breakdown_only_desired_speeds_are_fitted(road, tmp_path):
-    counts = tmp_path / "counts.csv"
+    counts, out = tmp_path / "counts.csv", tmp_path / "eidm.toml"
     told_by(road, ((700.0, 700.0), (100.0, 100.0)), 900.0).write_csv(counts)
-    told = invoke("calibrate", road, counts, "--model", "EIDM", "--json")
+    told = invoke("calibrate", road, counts, "--model", "EIDM", "--json", "--out", out)
     assert told.code == 0, told.err
     assert "Note: " in told.err
     assert "capacity is not identified: detector M2 shows no breakdown" in told.err
     found = json.loads(told.out)
+    assert found["name"] == "eidm"
     assert found["fit"] is None
     assert found["drivers"]["car_following"] == "EIDM"
     assert found["drivers"]["tau_s"] == 1.0
-    table = invoke("calibrate", road, counts, "--kmh")
-    assert "desired speed, mean (km/h)" in table.out
+    assert read_population(str(out))[1]["speed_factor"] == found["drivers"]["speed_factor"]
+
+
+def test_a_fit_is_shown_in_the_unit_asked_for():
+    fit = Fit(1.5, 0.97, 2.0, (1800.0, 1750.0), (2040.0, None), 7, 8)
+    found = Calibrated(HIDDEN, FreeSpeed(18.5, 0.7, 500, 20), fit, ())
+    table = calibrated_table(found, "krauss", 20.0, KMH)
+    shown = dict(table.rows)
+    assert shown["desired speed, mean (km/h)"] == "68.40"
+    assert shown["time gap, tau (s)"] == "1.500"
+    assert shown["RMSE of 5-minute speeds (km/h)"] == "7.20"
+    assert shown["breakdown (s): measured, simulated"] == "1800, 1750"
+    assert shown["highest 5-minute flow before (veh/h): the same"] == "2040, -"
+    assert shown["runs that broke down"] == "7 of 8"
 
 
 def counts_of(rows):

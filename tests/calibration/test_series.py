@@ -109,8 +109,10 @@ def test_spread_of_drivers_shows_in_means_of_few():
 
 def test_free_is_little_traffic_without_a_queue():
     free = free_intervals(BROKEN, "up", "down", 20.0, 1800.0)
-    # before 1800 s the most is 12; up to 9.6 counts as little
-    assert free.tolist() == [True, False, False, False, False, False, False, False]
+    # before 1800 s the most is 12, and the median 10.5
+    assert free.tolist() == [True, True, False, False, False, False, False, False]
+    whole = five_minutes([20.0, 19.0, 14.0, 20.0], [5, 8, 7, 8])
+    assert free_intervals(whole, "up", "down", 20.0, whole.end_s).tolist() == [1, 1, 0, 1]
 
 
 def test_a_queue_at_an_entry_hides_demand():

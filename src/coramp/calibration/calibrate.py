@@ -1,16 +1,17 @@
 """Fits a population of drivers to what detectors at a merge told."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from coramp._kernel import FloatArray
 from coramp.calibration.fit import Fit, fit_of
-from coramp.calibration.free_speed import FreeSpeed, free_intervals, free_speed
+from coramp.calibration.desired_speeds import free_traffic, rough_free_mps
+from coramp.calibration.free_speed import FreeSpeed
 from coramp.calibration.models import AXES, speed_factor, usual_population
 from coramp.calibration.moments import moments_of, names_of_moments, onset_s
-from coramp.calibration.replayed import Replayed, speed_loops
+from coramp.calibration.replayed import Replayed
 from coramp.calibration.search import Axis, Round, search
 from coramp.calibration.series import Series, breakdown_of
 from coramp.calibration.site import Site
@@ -20,8 +21,8 @@ from coramp.scenarios.sections import DriverPopulation
 
 BEFORE_S, AFTER_S = 1800.0, 1200.0
 """How much of the data before and after a breakdown is driven again by candidates."""
-FREE_S = 3600.0
-"""How much of the data before it is driven again for desired speeds."""
+QUANTILE = 0.8
+"""A fifth of the intervals upstream are faster than about free."""
 LEAST_BEFORE_S = 600.0
 LEAST_VEHICLES = 100
 """With fewer vehicles the mean of their speeds is off by 1 % or more."""
@@ -91,108 +92,51 @@ def calibrate_series(
     Desired speeds come first, from free traffic; then all that shows in how the merge breaks down;
     then desired speeds once more. Raises CorampError where data is too little for the first.
     """
-    rough_mps = _rough_mps(data, site)
+    rough_mps = rough_free_mps(data, site.upstream.id, QUANTILE)
     onset = onset_s(data, site, rough_mps)
-    free = _free_of(data, site, scenario, rough_mps, onset)
-    _check_enough(free)
+    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id, 0.5)
+    free = free_traffic(scenario, site, data, onset, (rough_mps, ramp_mps))
+    if free.told.vehicles < LEAST_VEHICLES:
+        raise CorampError(
+            f"free speed: only {free.told.vehicles} vehicles passed while traffic was free; "
+            f"calibration needs {LEAST_VEHICLES}"
+        )
     v0 = scenario.mainline.speed_mps
-    notes = []
-    deviation = USUAL_DEVIATION if free.deviation_mps is None else free.deviation_mps / v0
-    if free.deviation_mps is None:
+    told, notes = free.told, [*_notes(data, site, rough_mps, onset)]
+    broke = not notes
+    deviation = USUAL_DEVIATION if told.deviation_mps is None else told.deviation_mps / v0
+    if told.deviation_mps is None:
         notes.append(
-            f"the spread of desired speeds is not told by {free.intervals} intervals; "
+            f"the spread of desired speeds is not told by {told.intervals} intervals; "
             f"it is taken to be {100 * USUAL_DEVIATION:g} %"
         )
-    drivers = usual_population(model, speed_factor(free.mean_mps / v0, deviation))
-    start = breakdown_of(data.coarse(), site.upstream.id, rough_mps)
-    broke = start is not None and onset - data.begin_s >= LEAST_BEFORE_S
-    if start is None:
-        notes.append(
+    drivers = usual_population(model, speed_factor(told.mean_mps / v0, deviation))
+    done = Counter(effort)
+    for _ in range(2):
+        drivers = free.matched(drivers, effort.speed_runs, effort.jobs, done)
+    if not broke:
+        return Calibrated(drivers, told, None, tuple(notes))
+    window = data.between(onset - BEFORE_S, onset + AFTER_S)
+    replayed = Replayed(scenario, site, window, (told.mean_mps, ramp_mps))
+    drivers = _searched(replayed, drivers, AXES[model], effort, done)
+    drivers = free.matched(drivers, effort.speed_runs, effort.jobs, done, with_spread=False)
+    fitted = replayed.many([(drivers, 1 + k) for k in range(effort.fit_runs)], effort.jobs, done)
+    fit = fit_of(fitted, window, site, told.mean_mps)
+    return Calibrated(drivers, told, fit, tuple(notes))
+
+
+def _notes(data: Series, site: Site, free_mps: float, onset: float) -> Iterator[str]:
+    """What keeps the data from telling a capacity; nothing where it tells one."""
+    if breakdown_of(data.coarse(), site.upstream.id, free_mps) is None:
+        yield (
             f"capacity is not identified: detector {site.upstream.id} shows no breakdown (15 min "
             "at least 25 % below free speed); only desired speeds are fitted"
         )
-    elif not broke:
-        notes.append(
+    elif onset - data.begin_s < LEAST_BEFORE_S:
+        yield (
             f"capacity is not identified: the breakdown begins {onset - data.begin_s:g} s after "
             f"the data, allowed is from {LEAST_BEFORE_S:g} s on; only desired speeds are fitted"
         )
-    free_mps = (free.mean_mps, _free_at(data, site.ramp_entry.id, onset))
-    before = data.between(onset - FREE_S, onset)
-    at_will = Replayed(scenario, site, before, free_mps)
-    done = Counter(effort)
-    for _ in range(2):
-        drivers = _with_speeds(at_will, drivers, effort, done)
-    if not broke:
-        return Calibrated(drivers, free, None, tuple(notes))
-    window = data.between(onset - BEFORE_S, onset + AFTER_S)
-    replayed = Replayed(scenario, site, window, free_mps)
-    drivers = _searched(replayed, drivers, AXES[model], effort, done)
-    drivers = _with_speeds(at_will, drivers, effort, done, with_spread=False)
-    fitted = replayed.many([(drivers, 1 + k) for k in range(effort.fit_runs)], effort.jobs, done)
-    fit = fit_of(fitted, window, site, free.mean_mps)
-    return Calibrated(drivers, free, fit, tuple(notes))
-
-
-def _rough_mps(data: Series, site: Site) -> float:
-    """A free speed to tell queues by: what a fifth of the intervals exceeds."""
-    speeds = data.speed_mps[site.upstream.id]
-    if np.isnan(speeds).all():
-        raise CorampError(f"detector {site.upstream.id}: has no speeds; calibration needs them")
-    return float(np.nanquantile(speeds, 0.8))
-
-
-def _check_enough(free: FreeSpeed) -> None:
-    if free.vehicles < LEAST_VEHICLES:
-        raise CorampError(
-            f"free speed: only {free.vehicles} vehicles passed while traffic was free; "
-            f"calibration needs {LEAST_VEHICLES}"
-        )
-
-
-def _free_of(
-    series: Series, site: Site, scenario: Scenario, free_mps: float, onset: float
-) -> FreeSpeed:
-    when = free_intervals(series, site.upstream.id, site.downstream.id, free_mps, onset)
-    loops = speed_loops(site, scenario.mainline.start_m)
-    return free_speed(series, [loop.id for loop in loops], when)
-
-
-def _free_at(data: Series, detector: str, onset: float) -> float:
-    before = data.between(data.begin_s, onset)
-    speeds = before.speed_mps[detector]
-    if np.isnan(speeds).all():
-        raise CorampError(f"detector {detector}: has no speeds; calibration needs them")
-    return float(np.nanmedian(speeds))
-
-
-def _with_speeds(
-    replayed: Replayed,
-    drivers: DriverPopulation,
-    effort: Effort,
-    done: Counter,
-    with_spread: bool = True,
-) -> DriverPopulation:
-    """Returns drivers whose simulated free speeds are those measured, mean and spread.
-
-    On one lane nobody overtakes, and so measured speeds are lower than desired ones, and differ by
-    platoons. The simulation shows by how much: desired speeds are moved by what it is off.
-    """
-    site, measured, free_mps = replayed.site, replayed.measured, replayed.free_mps[0]
-    ends = site.upstream.id, site.downstream.id
-    when = free_intervals(measured, *ends, free_mps, measured.end_s)
-    names = [loop.id for loop in speed_loops(site, replayed.scenario.mainline.start_m)]
-    wanted = free_speed(measured, names, when)
-    runs = replayed.many([(drivers, 1 + k) for k in range(effort.speed_runs)], effort.jobs, done)
-    found = [free_speed(run, names, when) for run in runs]
-    factor = drivers.speed_factor
-    assert factor is not None
-    mean = factor.mean * wanted.mean_mps / float(np.mean([one.mean_mps for one in found]))
-    deviation = factor.deviation
-    spreads = [one.deviation_mps for one in found if one.deviation_mps is not None]
-    if with_spread and wanted.deviation_mps is not None and spreads:
-        ratio = wanted.deviation_mps / max(1e-6, float(np.mean(spreads)))
-        deviation *= min(2.0, max(0.25, ratio))
-    return drivers.model_copy(update={"speed_factor": speed_factor(mean, deviation)})
 
 
 def _searched(

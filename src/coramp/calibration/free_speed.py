@@ -32,13 +32,18 @@ def free_intervals(
 ) -> BoolArray:
     """Returns which intervals before ``end_s`` are free: no queue upstream, and little flow.
 
-    Little is up to 80 % of the highest flow of 5 min past ``downstream`` until then.
+    Little is up to 80 % of the highest flow of 5 min past ``downstream`` until then, or up to the
+    median where that is more, if the flow led to a breakdown; else the road could carry more, and
+    all is little.
     """
     before = series.between(series.begin_s, end_s)
     coarse = before.coarse()
-    most = coarse.flow_veh_h(downstream).max() if coarse.intervals else np.inf
+    flows = coarse.flow_veh_h(downstream)
+    most = np.inf
+    if coarse.intervals and end_s < series.end_s:
+        most = max(FREE_SHARE * flows.max(), float(np.median(flows)))
     parts = round(coarse.interval_s / series.interval_s)
-    little = np.repeat(coarse.flow_veh_h(downstream) <= FREE_SHARE * most, parts)
+    little = np.repeat(flows <= most, parts)
     free = np.zeros(series.intervals, np.bool_)
     free[: len(little)] = little & ~queued(before, upstream, free_mps)[: len(little)]
     return free

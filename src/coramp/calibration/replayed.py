@@ -9,7 +9,6 @@ from functools import cached_property
 from coramp.calibration.demand import saturated
 from coramp.calibration.series import Series, queued, series_of
 from coramp.calibration.site import Site
-from coramp.metrics.queues import LOOP_M
 from coramp.scenarios.demand_sections import DemandPart, Detector
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
@@ -101,15 +100,3 @@ class Replayed:
 
         with ThreadPoolExecutor(jobs) as pool:
             return list(pool.map(one, candidates))
-
-
-def speed_loops(site: Site, start_m: float) -> list[Detector]:
-    """Returns the mainline's detectors before the nose at which drivers go as they wish.
-
-    Who has just entered may still be speeding up: of detectors within half the way to the loop at
-    which queues are seen, the furthest counts alone, and only where there is no other.
-    """
-    before = [loop for loop in site.loops if loop.road == "mainline" and loop.station_m <= 0.0]
-    least_m = 0.5 * (start_m + max(LOOP_M, 0.5 * start_m))
-    settled = [loop for loop in before if loop.station_m >= least_m]
-    return settled or [max(before, key=lambda loop: loop.station_m)]
