@@ -4,11 +4,19 @@ import numpy as np
 import polars as pl
 import pytest
 
+from coramp.calibration.breakdowns import windows_of
 from coramp.calibration.demand import saturated
 from coramp.calibration.fit import fit_of, geh
-from coramp.calibration.free_speed import free_intervals, free_speed
+from coramp.calibration.free_speed import free_speed
 from coramp.calibration.moments import moments_of, names_of_moments, onset_s
-from coramp.calibration.series import Series, breakdown_of, capacity_veh_h, queued, series_of
+from coramp.calibration.series import (
+    Series,
+    breakdown_of,
+    capacity_veh_h,
+    queued,
+    queues_of,
+    series_of,
+)
 from coramp.calibration.site import site_of
 from coramp.counts.table import SCHEMA
 from coramp.errors import CorampError
@@ -70,6 +78,18 @@ def test_a_breakdown_lasts_15_minutes_below_three_quarters_of_free_speed():
     assert breakdown_of(five_minutes([20.0, 14.0, 14.0, 20.0], [1] * 4), "up", 20.0) is None
 
 
+def test_each_breakdown_is_a_window_of_its_own():
+    up = [20.0] * 3 + [5.0] * 4 + [20.0] * 4 + [5.0, 5.0, 20.0] + [4.0] * 3 + [20.0] * 3
+    series = five_minutes(up, range(len(up)))
+    assert queues_of(series, "up", 20.0) == [(3, 7), (14, 17)]
+    windows = windows_of(series, SITE, 20.0)
+    assert [(w.begin_s, w.end_s) for w in windows] == [(600.0, 2700.0), (3000.0, 6000.0)]
+    assert [onset_s(window, SITE, 20.0) for window in windows] == [1500.0, 4800.0]
+    assert windows_of(five_minutes([20.0] * 4, [1] * 4), SITE, 20.0) == []
+    at_once = five_minutes([20.0, 5.0, 5.0, 5.0], [1] * 4)
+    assert windows_of(at_once, SITE, 20.0) == []
+
+
 def test_the_onset_is_told_by_the_minute():
     minutes = np.repeat([20.0, 20.0, 14.0, 3.0, 3.0, 3.0], 5)
     minutes[10:12] = 19.0  # the first two minutes of the queue's first 5 min are free
@@ -107,14 +127,6 @@ def test_spread_of_drivers_shows_in_means_of_few():
     assert found.deviation_mps == pytest.approx(np.sqrt(6 * 4.0 / 5))
 
 
-def test_free_is_little_traffic_without_a_queue():
-    free = free_intervals(BROKEN, "up", "down", 20.0, 1800.0)
-    # before 1800 s the most is 12, and the median 10.5
-    assert free.tolist() == [True, True, False, False, False, False, False, False]
-    whole = five_minutes([20.0, 19.0, 14.0, 20.0], [5, 8, 7, 8])
-    assert free_intervals(whole, "up", "down", 20.0, whole.end_s).tolist() == [1, 1, 0, 1]
-
-
 def test_a_queue_at_an_entry_hides_demand():
     counts = np.array([8.0, 10.0, 12.0, 5.0, 14.0, 11.0])
     queue = np.array([False, False, False, True, True, False])
@@ -128,7 +140,7 @@ def test_geh_of_known_flows():
 
 
 def test_data_fits_itself():
-    fit = fit_of([BROKEN, BROKEN], BROKEN, SITE, 20.0)
+    fit = fit_of([(BROKEN, BROKEN)] * 2, SITE, 20.0)
     assert (fit.geh, fit.good_geh_share, fit.speed_rmse_mps) == (0.0, 1.0, 0.0)
     assert fit.breakdown_s == (1800.0, 1800.0)
     assert fit.capacity_veh_h == (144.0, 144.0)

@@ -19,7 +19,8 @@ class Fit:
 
     ``geh`` is the mean of GEH, ``good_geh_share`` the share below 5, ``speed_rmse_mps`` the root of
     the mean squared difference of speeds. Times (s) and flows (veh/h) come in pairs, measured and
-    simulated; None where there is no breakdown. ``broke_down`` is in how many of ``runs``.
+    simulated, means over breakdowns and runs; None where there is no breakdown. ``broke_down`` is
+    in how many of ``runs``.
     """
 
     geh: float
@@ -38,35 +39,37 @@ def geh(simulated_veh_h: FloatArray, measured_veh_h: FloatArray) -> FloatArray:
     return np.sqrt(np.divide(square, both, out=np.zeros_like(both), where=both > 0.0))
 
 
-def fit_of(simulated: Sequence[Series], measured: Series, site: Site, free_mps: float) -> Fit:
-    """Returns how runs of one population agree with what was measured."""
-    detectors = [loop.id for loop in site.loops]
-    coarse = measured.coarse()
+def fit_of(runs: Sequence[tuple[Series, Series]], site: Site, free_mps: float) -> Fit:
+    """Returns how runs of one population agree with what was measured: pairs of the two."""
     flows, speeds = [], []
-    for run in simulated:
-        own = run.coarse()
-        for name in detectors:
-            flows.append(geh(own.flow_veh_h(name), coarse.flow_veh_h(name)))
-            speeds.append(own.speed_mps[name] - coarse.speed_mps[name])
+    for simulated, measured in runs:
+        own, other = simulated.coarse(), measured.coarse()
+        for loop in site.loops:
+            flows.append(geh(own.flow_veh_h(loop.id), other.flow_veh_h(loop.id)))
+            speeds.append(own.speed_mps[loop.id] - other.speed_mps[loop.id])
     found, off = np.concatenate(flows), np.concatenate(speeds)
-    onsets = [onset_s(run, site, free_mps) for run in simulated]
-    onsets = [onset for onset in onsets if onset < measured.end_s]
+    onsets_s = [[_onset_s(one, site, free_mps) for one in pair] for pair in zip(*runs, strict=True)]
     ends = site.upstream.id, site.downstream.id
-    capacities = [capacity_veh_h(run, *ends, free_mps) for run in simulated]
-    told = [capacity for capacity in capacities if capacity is not None]
-    measured_onset_s = onset_s(measured, site, free_mps)
+    capacities = [
+        [capacity_veh_h(one, *ends, free_mps) for one in pair] for pair in zip(*runs, strict=True)
+    ]
     return Fit(
         float(found.mean()),
         float((found < GOOD_GEH).mean()),
         float(np.sqrt(np.nanmean(off**2))),
-        (
-            measured_onset_s if measured_onset_s < measured.end_s else None,
-            float(np.mean(onsets)) if onsets else None,
-        ),
-        (
-            capacity_veh_h(measured, *ends, free_mps),
-            float(np.mean(told)) if told else None,
-        ),
-        len(onsets),
-        len(simulated),
+        (_mean(onsets_s[1]), _mean(onsets_s[0])),
+        (_mean(capacities[1]), _mean(capacities[0])),
+        sum(onset is not None for onset in onsets_s[0]),
+        len(runs),
     )
+
+
+def _onset_s(series: Series, site: Site, free_mps: float) -> float | None:
+    onset = onset_s(series, site, free_mps)
+    return onset if onset < series.end_s else None
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean of those that are known, None for none."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
-from coramp.calibration.series import Series, queued
+from coramp.calibration.series import Series
 
-FREE_SHARE = 0.8
-"""Up to this share of the highest flow drivers count as free."""
 LEAST_INTERVALS = 6
 """With fewer intervals the spread is off by a third."""
 
@@ -25,28 +23,6 @@ class FreeSpeed:
     deviation_mps: float | None
     vehicles: int
     intervals: int
-
-
-def free_intervals(
-    series: Series, upstream: str, downstream: str, free_mps: float, end_s: float
-) -> BoolArray:
-    """Returns which intervals before ``end_s`` are free: no queue upstream, and little flow.
-
-    Little is up to 80 % of the highest flow of 5 min past ``downstream`` until then, or up to the
-    median where that is more, if the flow led to a breakdown; else the road could carry more, and
-    all is little.
-    """
-    before = series.between(series.begin_s, end_s)
-    coarse = before.coarse()
-    flows = coarse.flow_veh_h(downstream)
-    most = np.inf
-    if coarse.intervals and end_s < series.end_s:
-        most = max(FREE_SHARE * flows.max(), float(np.median(flows)))
-    parts = round(coarse.interval_s / series.interval_s)
-    little = np.repeat(flows <= most, parts)
-    free = np.zeros(series.intervals, np.bool_)
-    free[: len(little)] = little & ~queued(before, upstream, free_mps)[: len(little)]
-    return free
 
 
 def free_speed(series: Series, detectors: Sequence[str], when: BoolArray) -> FreeSpeed:

@@ -7,7 +7,8 @@ from typing import Any
 
 import polars as pl
 
-from coramp.calibration.calibrate import Calibrated, Effort, calibrate_series
+from coramp.calibration.calibrate import Calibrated, calibrate_series
+from coramp.calibration.effort import Effort
 from coramp.calibration.models import model_checked
 from coramp.calibration.series import series_of
 from coramp.calibration.site import site_of

@@ -8,7 +8,7 @@ from coramp.scenarios.sections import DriverPopulation, SpeedFactor
 
 COMMON = (
     Axis("tau_s", 0.5, 2.0),
-    Axis("accel_mps2", 0.8, 3.5),
+    Axis("accel_mps2", 0.8, 3.5, usual=2.6),
     Axis("min_gap_m", 1.0, 4.0, usual=2.5),
     Axis("lc_cooperative", 0.3, 1.0, usual=1.0),
     Axis("lc_assertive", 0.6, 2.5, usual=1.0),

@@ -1,12 +1,13 @@
 """The measured demand again, with other drivers: what detectors would have told."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
 from coramp.calibration.demand import saturated
+from coramp.calibration.effort import Effort
 from coramp.calibration.series import Series, queued, series_of
 from coramp.calibration.site import Site
 from coramp.scenarios.demand_sections import DemandPart, Detector
@@ -48,7 +49,7 @@ class Replayed:
             for loop, free_mps in self._entries
         ]
         interval_s = self.measured.interval_s
-        return interval_s * math.ceil(max(ways_s) / interval_s)
+        return float(interval_s * math.ceil(max(ways_s) / interval_s))
 
     @property
     def _entries(self) -> list[tuple[Detector, float]]:
@@ -80,23 +81,19 @@ class Replayed:
         changed = {"demand": tuple(demand), "detector": loops, "simulation": simulation}
         return self.scenario.model_copy(update={**changed, "arrivals": ()})
 
-    def many(
-        self,
-        candidates: Sequence[tuple[DriverPopulation, int]],
-        jobs: int,
-        done: Callable[[], None],
-    ) -> list[Series]:
-        """Returns the series of many candidates with their seeds; ``jobs`` run at a time.
 
-        ``done`` is called after each.
-        """
-        for drivers, _ in candidates:
-            build_network(self.driven, drivers)
+def driven_again(
+    runs: Sequence[tuple[Replayed, DriverPopulation, int]], effort: Effort
+) -> list[Series]:
+    """Returns the series of replays by candidates, each with a seed, several at a time."""
+    for replayed, drivers, _ in runs:
+        build_network(replayed.driven, drivers)
 
-        def one(candidate: tuple[DriverPopulation, int]) -> Series:
-            found = self.series(*candidate)
-            done()
-            return found
+    def one(run: tuple[Replayed, DriverPopulation, int]) -> Series:
+        replayed, drivers, seed = run
+        found = replayed.series(drivers, seed)
+        effort.counter.one_more()
+        return found
 
-        with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(one, candidates))
+    with ThreadPoolExecutor(effort.jobs) as pool:
+        return list(pool.map(one, runs))

@@ -25,8 +25,10 @@ RIDGE = 1e-2
 """Weight against steep functions, in units of one run's: it decides what runs leave open."""
 MOST = 9.0
 """No number counts for more than three times its noise, so that none that cannot fit rules."""
-PULL = 4.0
-"""What a parameter costs a whole range from its usual value: what shows nowhere stays there."""
+USUAL_WITHIN = 0.25
+"""The share of its range by which a parameter may well differ from its usual value."""
+SHRUNK = 0.3
+"""By how much correlations of noise are taken to be less than they seem: runs are few."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,16 @@ class Runs:
 
 @dataclass(frozen=True)
 class Surrogate:
-    """Means and noise of the numbers as functions of the place, good near a centre."""
+    """Means of the numbers as functions of the place, good near a centre, and their noise.
+
+    ``noise`` is its standard deviation, infinite for a number that no run told; ``correlation`` is
+    that of the noise of any two.
+    """
 
     centre: FloatArray
     coefficients: FloatArray
     noise: FloatArray
+    correlation: FloatArray
 
     def means(self, places: FloatArray) -> FloatArray:
         """Returns the numbers' means at places, one row each."""
@@ -99,6 +106,7 @@ def surrogate_of(runs: Runs, centre: FloatArray, reach: float, floor: FloatArray
     near = np.exp(-0.5 * (distance / reach) ** 2)
     coefficients = np.zeros((basis.shape[1], runs.numbers.shape[1]))
     noise = np.full(runs.numbers.shape[1], np.inf)
+    residuals = np.full(runs.numbers.shape, np.nan)
     punished = np.full(basis.shape[1], RIDGE)
     punished[0] = 0.0
     for k in range(runs.numbers.shape[1]):
@@ -117,7 +125,23 @@ def surrogate_of(runs: Runs, centre: FloatArray, reach: float, floor: FloatArray
         coefficients[:, k] = found * scale
         coefficients[0, k] += middle
         noise[k] = max(float(floor[k]), scale * float(np.sqrt((weight * off**2).sum() / freedom)))
-    return Surrogate(centre, coefficients, noise)
+        residuals[known, k] = off
+    return Surrogate(centre, coefficients, noise, _correlation(residuals, near))
+
+
+def _correlation(residuals: FloatArray, weight: FloatArray) -> FloatArray:
+    """Returns correlations of residuals over the runs that tell both numbers, shrunk towards 0."""
+    count = residuals.shape[1]
+    found = np.eye(count)
+    for i in range(count):
+        for j in range(i):
+            both = ~np.isnan(residuals[:, i]) & ~np.isnan(residuals[:, j])
+            first, second, own = residuals[both, i], residuals[both, j], weight[both]
+            squares = float((own * first**2).sum() * (own * second**2).sum())
+            if squares > 0.0:
+                product = float((own * first * second).sum()) / squares**0.5
+                found[i, j] = found[j, i] = (1.0 - SHRUNK) * product
+    return found
 
 
 def costs(
@@ -129,7 +153,10 @@ def costs(
     """
     counted = counted_of(surrogate, measured)
     off = (surrogate.means(places) - measured)[:, counted] / surrogate.noise[counted]
-    return np.asarray(np.minimum(MOST, off**2).sum(1) + PULL * np.nansum((places - usual) ** 2, 1))
+    values, vectors = np.linalg.eigh(surrogate.correlation[np.ix_(counted, counted)])
+    squares = (off @ vectors) ** 2 / np.maximum(values, 0.5 * SHRUNK)
+    aside = np.nansum(((places - usual) / USUAL_WITHIN) ** 2, 1)
+    return np.asarray(np.minimum(MOST, squares).sum(1) + aside)
 
 
 def counted_of(surrogate: Surrogate, measured: FloatArray) -> BoolArray:

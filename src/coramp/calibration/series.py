@@ -107,12 +107,28 @@ def queued(series: Series, detector: str, free_mps: float) -> BoolArray:
 
 def breakdown_of(series: Series, detector: str, free_mps: float) -> int | None:
     """Returns the interval in which a queue of at least 15 min begins, None where none does."""
+    found = queues_of(series, detector, free_mps)
+    return found[0][0] if found else None
+
+
+def queues_of(series: Series, detector: str, free_mps: float) -> list[tuple[int, int]]:
+    """Returns the queues of breakdowns: their first intervals, and those after their last ones.
+
+    A queue ends where none was seen for 15 min.
+    """
     slow = queued(series, detector, free_mps)
     least = max(1, round(SUSTAINED_S / series.interval_s))
-    for k in range(len(slow) - least + 1):
-        if slow[k : k + least].all():
-            return k
-    return None
+    found, k = [], 0
+    while k + least <= len(slow):
+        if not slow[k : k + least].all():
+            k += 1
+            continue
+        end = k
+        while end < len(slow) and slow[end : end + least].any():
+            end += 1
+        found.append((k, end))
+        k = end
+    return found
 
 
 def capacity_veh_h(series: Series, upstream: str, downstream: str, free_mps: float) -> float | None:

@@ -45,7 +45,7 @@ def calibrate(
 
     The data should hold free traffic and a breakdown.
     """
-    from coramp.calibration.calibrate import Effort
+    from coramp.calibration.effort import Effort
     from coramp.calibration.from_files import Asked, calibrated
     from coramp.calibration.models import model_checked
     from coramp.calibration.written import checked_out, write_population
