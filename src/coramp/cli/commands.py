@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from coramp.cli.calibration_commands import calibration
 from coramp.cli.demand_commands import demand
 from coramp.cli.listing_commands import listing
 from coramp.cli.network_commands import networks
@@ -41,5 +42,5 @@ def _options(
     """Cooperative on-ramp merging: plan, simulate, compare and explain."""
 
 
-for commands in (listing, networks, demand, computing, showing):
+for commands in (listing, networks, demand, computing, calibration, showing):
     app.add_typer(commands)

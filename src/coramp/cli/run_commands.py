@@ -53,7 +53,9 @@ def run(
     ramp: Annotated[float | None, typer.Option(help="Ramp flow in veh/h.")] = None,
     drivers: Annotated[
         str | None,
-        typer.Option(help="Population of drivers: paper, fair or another of the scenario."),
+        typer.Option(
+            help="Drivers: paper, fair or others of the scenario, or a file of coramp calibrate."
+        ),
     ] = None,
     settings: Annotated[
         list[str] | None,

@@ -21,6 +21,7 @@ from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_dri
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
+from coramp.scenarios.population_files import is_population_file, read_population
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
@@ -129,7 +130,8 @@ def make_spec(
 ) -> RunSpec:
     """Returns the specification of a run; raises CorampError for what cannot be run.
 
-    Errors name the options of the command line, or else say ``blamed`` for all of them.
+    ``drivers`` is the name of a population of the scenario, or a file that holds one. Errors name
+    the options of the command line, or else say ``blamed`` for all of them.
     """
     chosen = strategy_named(strategy)
     engine_checked(engine)
@@ -148,7 +150,8 @@ def make_spec(
     blame = {**blame_kmh, **{key: OPTIONS[key] for key in named}}
     if blamed is not None:
         blame = dict.fromkeys(blame, blamed)
-    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame)
+    drivers, populations = _drivers_asked(drivers)
+    loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame, populations)
     _check_types(loaded, chosen)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)
@@ -173,6 +176,14 @@ def _check_given_once(
         options = {**OPTIONS, "traffic.drivers": "--drivers"}
         told = ", ".join(f"{key} by {options[key]} and by --set" for key in twice)
         raise CorampError(f"{blamed or '--set'}: {told}: given twice; allowed is once")
+
+
+def _drivers_asked(drivers: str | None) -> tuple[str | None, dict[str, Any]]:
+    """Returns the name of drivers and, where they lie in a file, their table by that name."""
+    if drivers is None or not is_population_file(drivers):
+        return drivers, {}
+    name, table = read_population(drivers)
+    return name, {name: table}
 
 
 def _check_types(scenario: Scenario, strategy: type[Strategy]) -> None:

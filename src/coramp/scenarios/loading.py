@@ -10,6 +10,7 @@ from coramp.scenarios.listed import with_listed_flows, without_replaced_flows
 from coramp.scenarios.measured import with_counts
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.network_section import check_network, with_path
+from coramp.scenarios.population_files import with_population, with_population_of_traffic
 from coramp.scenarios.speeds_kmh import data_in_mps, overrides_in_mps
 from coramp.scenarios.toml_files import builtin_names, read, validated, with_overrides
 from coramp.scenarios.world_sections import with_preset
@@ -19,11 +20,13 @@ def load_scenario(
     name: str,
     overrides: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
+    populations: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Scenario:
     """Returns the built-in scenario of that name, or that of a file, with dotted keys overridden.
 
-    ``origins`` says what to blame for an overridden key, else it is ``--set``. Raises CorampError
-    with a message for each thing that is wrong.
+    ``origins`` says what to blame for an overridden key, else it is ``--set``. ``populations`` are
+    drivers that it is to have beside its own, by name. Raises CorampError with a message for each
+    thing that is wrong.
     """
     label, data = read("scenarios", name)
     data = with_path(data, label)
@@ -33,6 +36,9 @@ def load_scenario(
     overrides, blamed = overrides_in_mps(overrides, blamed)
     data = with_populations(data)
     data = with_overrides(without_replaced_flows(data, overrides), overrides, blamed)
+    data = with_population_of_traffic(data, name, "traffic.drivers" in overrides)
+    for own, table in (populations or {}).items():
+        data = with_population(data, own, table)
     data = with_counts(with_preset(data), label, blamed)
     data = with_demand_flows(data, label, blamed)
     data = with_defaults(with_listed_flows(data, label, blamed), label)

@@ -162,7 +162,8 @@ class DriverPopulation(Model):
     ``wish`` is the speed that each seeks: its own entry speed everywhere, or v_R0 on the ramp and
     v0 from there on, times its ``speed_factor`` if there is one. ``tau_s`` is one time gap for
     all, or a list of equally likely ones. ``accel_mps2`` is SUMO's own if left out.
-    ``car_following`` is SUMO's model; ``sigma`` counts for Krauss alone.
+    ``car_following`` is SUMO's model; ``sigma`` counts for Krauss alone. ``origin`` says where the
+    population comes from, if it was fitted to something.
     """
 
     wish: Literal["entry-speed", "free-flow"]
@@ -172,8 +173,12 @@ class DriverPopulation(Model):
     tau_s: DriverGaps = 1.0
     min_gap_m: Annotated[float, Field(ge=0.0, le=20.0)] = 2.5
     lc_cooperative: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    lc_assertive: Annotated[float, Field(gt=0.0, le=20.0)] = 1.0
+    lc_strategic: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
+    lc_speed_gain: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
     car_following: Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"] = "Krauss"
     integrator: Literal["euler", "ballistic"] = "euler"
+    origin: str = ""
 
     @property
     def highest_factor(self) -> float:

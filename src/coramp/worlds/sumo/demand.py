@@ -233,8 +233,18 @@ def _manners(drivers: DriverPopulation, own: DriverTraits) -> str:
     noise = f'sigma="{drivers.sigma!r}" ' if model == "Krauss" else f'carFollowModel="{model}" '
     return (
         f'{noise}tau="{own.tau_s!r}" '
-        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{yields!r}"{looks}'
+        f'minGap="{drivers.min_gap_m!r}" lcCooperative="{yields!r}"{_changes(drivers)}{looks}'
     )
+
+
+def _changes(drivers: DriverPopulation) -> str:
+    """How drivers change lanes, where that differs from SUMO's own values, which are all 1."""
+    told = {
+        "lcAssertive": drivers.lc_assertive,
+        "lcStrategic": drivers.lc_strategic,
+        "lcSpeedGain": drivers.lc_speed_gain,
+    }
+    return "".join(f' {name}="{value!r}"' for name, value in told.items() if value != 1.0)
 
 
 def _vehicle(

@@ -1,0 +1,1 @@
+"""Drivers as measured: a population fitted to what detectors told."""

@@ -1,0 +1,139 @@
+"""Fits a population of drivers to what detectors at a merge told."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coramp._kernel import FloatArray
+from coramp.calibration.breakdowns import LEAST_BEFORE_S, windows_of
+from coramp.calibration.desired_speeds import USUAL_DEVIATION, free_traffic, rough_free_mps
+from coramp.calibration.effort import Effort
+from coramp.calibration.fit import Fit, fit_of
+from coramp.calibration.free_speed import FreeSpeed
+from coramp.calibration.models import AXES, speed_factor, usual_population
+from coramp.calibration.moments import moments_of, names_of_moments, onset_s
+from coramp.calibration.replayed import Replayed, driven_again
+from coramp.calibration.search import Axis, Round, search
+from coramp.calibration.series import Series, breakdown_of
+from coramp.calibration.site import Site
+from coramp.errors import CorampError
+from coramp.scenarios.model import Scenario
+from coramp.scenarios.sections import DriverPopulation
+
+QUANTILE = 0.8
+"""A fifth of the intervals upstream are faster than about free."""
+LEAST_VEHICLES = 100
+"""With fewer vehicles the mean of their speeds is off by 1 % or more."""
+ROUNDS = ((2, 0.5, 0.3), (1, 0.25, 0.2), (1, 0.12, 0.1))
+"""Quarters of the runs, half width and reach of each round."""
+LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
+"""Least noise of the numbers that the search compares, by what their names end in."""
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A population fitted to data; ``fit`` is None where the data shows no breakdown.
+
+    ``notes`` say what the data does not tell.
+    """
+
+    drivers: DriverPopulation
+    free: FreeSpeed
+    fit: Fit | None
+    notes: tuple[str, ...]
+
+
+def calibrate_series(
+    scenario: Scenario, site: Site, data: Series, model: str, effort: Effort
+) -> Calibrated:
+    """Returns the population of a model that fits data of detectors best.
+
+    Desired speeds come first, from free traffic; then all that shows in how the merge breaks down;
+    then desired speeds once more. Raises CorampError where data is too little for the first.
+    """
+    rough_mps = rough_free_mps(data, site.upstream.id, QUANTILE)
+    onset = onset_s(data, site, rough_mps)
+    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id, 0.5)
+    free = free_traffic(scenario, site, data, onset, (rough_mps, ramp_mps))
+    if free.told.vehicles < LEAST_VEHICLES:
+        raise CorampError(
+            f"free speed: only {free.told.vehicles} vehicles passed while traffic was free; "
+            f"calibration needs {LEAST_VEHICLES}"
+        )
+    windows = windows_of(data, site, free.told.mean_mps)
+    told, notes = free.told, [] if windows else [_unidentified(data, site, rough_mps, onset)]
+    if told.deviation_mps is None:
+        notes.append(
+            f"the spread of desired speeds is not told by {told.intervals} intervals; "
+            f"it is taken to be about {100 * USUAL_DEVIATION:g} %"
+        )
+    usual = speed_factor(told.mean_mps / scenario.mainline.speed_mps, USUAL_DEVIATION)
+    drivers = free.fitted(usual_population(model, usual), effort, near=False)
+    if not windows:
+        return Calibrated(drivers, told, None, tuple(notes))
+    replays = [Replayed(scenario, site, w, (told.mean_mps, ramp_mps)) for w in windows]
+    drivers = _searched(replays, drivers, AXES[model], effort)
+    drivers = free.fitted(drivers, effort, near=True)
+    turns = [replays[k % len(replays)] for k in range(effort.fit_runs)]
+    made = driven_again([(turn, drivers, 1 + k) for k, turn in enumerate(turns)], effort)
+    measured = [turn.measured for turn in turns]
+    fit = fit_of(list(zip(made, measured, strict=True)), site, told.mean_mps)
+    return Calibrated(drivers, told, fit, tuple(notes))
+
+
+def _unidentified(data: Series, site: Site, free_mps: float, onset: float) -> str:
+    """What keeps the data from telling a capacity."""
+    if breakdown_of(data.coarse(), site.upstream.id, free_mps) is None:
+        return (
+            f"capacity is not identified: detector {site.upstream.id} shows no breakdown (15 min "
+            "at least 25 % below free speed); only desired speeds are fitted"
+        )
+    return (
+        f"capacity is not identified: the breakdown begins {onset - data.begin_s:g} s after the "
+        f"data, allowed is from {LEAST_BEFORE_S:g} s on; only desired speeds are fitted"
+    )
+
+
+def _searched(
+    replays: Sequence[Replayed],
+    drivers: DriverPopulation,
+    axes: Sequence[Axis],
+    effort: Effort,
+) -> DriverPopulation:
+    """Returns drivers with parameters along the axes at which runs are nearest to the data.
+
+    Runs go through the breakdowns by turns; what counts is how far they are off the measured one.
+    """
+    site, free_mps = replays[0].site, replays[0].free_mps[0]
+    measured = [moments_of(replayed.measured, site, free_mps) for replayed in replays]
+    made = 0
+
+    def at(place: FloatArray) -> DriverPopulation:
+        shares = zip(axes, place.tolist(), strict=True)
+        values = {axis.name: axis.value(share) for axis, share in shares}
+        return drivers.model_copy(update=values)
+
+    def simulate(places: FloatArray) -> FloatArray:
+        nonlocal made
+        numbers = range(made, made + len(places))
+        made += len(places)
+        runs = [
+            (replays[k % len(replays)], at(place), 1 + k // len(replays) % effort.seeds)
+            for k, place in zip(numbers, places, strict=True)
+        ]
+        found = driven_again(runs, effort)
+        turns = [measured[k % len(replays)] for k in numbers]
+        told = [moments_of(run, site, free_mps) for run in found]
+        return np.array(told) - np.array(turns)
+
+    floor = [LEAST_NOISE[name.rsplit(" ", 1)[-1]] for name in names_of_moments(site)]
+    rounds = [Round(quarters * effort.runs // 4, *rest) for quarters, *rest in ROUNDS]
+    place, _, _ = search(
+        axes,
+        rounds,
+        simulate,
+        np.zeros(len(floor)),
+        np.array(floor),
+    )
+    return at(place)

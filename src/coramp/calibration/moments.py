@@ -1,0 +1,79 @@
+"""A stretch of detector data in a few numbers, in which a population of drivers shows."""
+
+import numpy as np
+
+from coramp._kernel import BoolArray, FloatArray
+from coramp.calibration.series import Series, breakdown_of, queued
+from coramp.calibration.site import Site
+
+OBJECTIVE = (
+    "sum of squares of measured minus simulated over the simulation's noise: breakdown time, "
+    "highest 5-minute flow before, discharge and the ramp's share of it, mean speed at each "
+    "detector before and after"
+)
+
+
+def names_of_moments(site: Site) -> list[str]:
+    """Returns what each number of ``moments_of`` is."""
+    return [
+        "breakdown time (s)",
+        "highest flow before (veh/h)",
+        "discharge (veh/h)",
+        "ramp's share of the discharge",
+        *(f"speed at {loop.id} before (m/s)" for loop in site.loops),
+        *(f"speed at {loop.id} after (m/s)" for loop in site.loops),
+    ]
+
+
+def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
+    """Returns numbers of what detectors told, nan for each that it does not tell.
+
+    When the merge broke down, the end where it did not; the highest flow of 5 min before; the mean
+    flow from the first full interval of the queue on, and the share of it that came by the ramp;
+    then at each detector the mean speed of vehicles before the breakdown, and from it on.
+    """
+    coarse = series.coarse()
+    start = breakdown_of(coarse, site.upstream.id, free_mps)
+    flow_veh_h = coarse.flow_veh_h(site.downstream.id)
+    before = np.ones(coarse.intervals, np.bool_)
+    if start is not None:
+        before[start:] = False
+    after = queued(coarse, site.upstream.id, free_mps) & ~before
+    if start is not None:
+        after[start] = False
+    ramp = coarse.vehicles[site.ramp_entry.id]
+    both = ramp + coarse.vehicles[site.mainline_entry.id]
+    return np.array(
+        [
+            onset_s(series, site, free_mps),
+            flow_veh_h[before].max() if before.any() else np.nan,
+            flow_veh_h[after].mean() if after.any() else np.nan,
+            ramp[after].sum() / both[after].sum() if after.any() and both[after].sum() else np.nan,
+            *(_speed_mps(coarse, loop.id, before) for loop in site.loops),
+            *(_speed_mps(coarse, loop.id, after) for loop in site.loops),
+        ]
+    )
+
+
+def onset_s(series: Series, site: Site, free_mps: float) -> float:
+    """Returns when the queue of a breakdown began, in the data's own intervals; the end for none.
+
+    That is the end of the last interval without a queue in the breakdown's first 5 min or the 5 min
+    before.
+    """
+    coarse = series.coarse()
+    start = breakdown_of(coarse, site.upstream.id, free_mps)
+    if start is None:
+        return series.end_s
+    parts = round(coarse.interval_s / series.interval_s)
+    first, last = max(0, (start - 1) * parts), (start + 1) * parts
+    free = np.flatnonzero(~queued(series, site.upstream.id, free_mps)[first:last])
+    begin = first + int(free[-1]) + 1 if len(free) else first
+    return series.begin_s + begin * series.interval_s
+
+
+def _speed_mps(series: Series, detector: str, when: BoolArray) -> float:
+    counts, speeds = series.vehicles[detector][when], series.speed_mps[detector][when]
+    known = ~np.isnan(speeds)
+    total = counts[known].sum()
+    return float((counts[known] * speeds[known]).sum() / total) if total else float("nan")
