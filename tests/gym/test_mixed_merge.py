@@ -166,12 +166,15 @@ def test_without_the_supervisor_full_throttle_collides(made, monkeypatch):
     """What keeps agents safe is the on-board part: the test above can fail."""
     from coramp.worlds.sumo import mixed
 
-    def as_told(users, around, ahead, told_mps2, changes, laws):
+    by_the_law = mixed.driven_and_changes
+
+    def as_told(users, around, ahead, told_mps2, wishes, laws):
+        changes = by_the_law(users, around, ahead, told_mps2, wishes, laws)[1]
         accel = np.minimum(told_mps2, laws.following.speed_up_mps2)
         stops = -users.speed_mps / laws.period_s
-        return np.where(users.automated, np.maximum(stops, accel), 0.0)
+        return np.where(users.automated, np.maximum(stops, accel), 0.0), changes
 
-    monkeypatch.setattr(mixed, "driven_mps2", as_told)
+    monkeypatch.setattr(mixed, "driven_and_changes", as_told)
     env = made(mainline_veh_h=1200.0, overrides={"mainline.speed_mps": 20.0}, **SHORT)
     driven(env, 21, constant(0.2, 1.0))
     assert env.figures()["automated_violations"] > 0
