@@ -134,6 +134,17 @@ def test_a_fit_is_shown_in_the_unit_asked_for():
     assert shown["runs that broke down"] == "7 of 8"
 
 
+def test_data_that_begins_in_a_queue_is_refused(road, tmp_path):
+    counts = tmp_path / "counts.csv"
+    places = [("M1", 15, 5.0), ("M3", 20, 18.0), ("R1", 5, 15.0)]
+    slow, fast = (counts_of([*places, ("M2", 15, speed)]) for speed in (4.0, 19.0))
+    later = fast.with_columns(pl.col("begin_s", "end_s") + 1200.0)
+    pl.concat([slow, later]).write_csv(counts)
+    told = invoke("calibrate", road, counts)
+    assert told.code == 1
+    assert "M2: stands in a queue when the data begins" in told.errors[-1]
+
+
 def counts_of(rows):
     lines = [
         (60.0 * k, 60.0 * (k + 1), name, 0, "car", count, speed)
