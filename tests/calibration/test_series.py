@@ -6,6 +6,7 @@ import pytest
 
 from coramp.calibration.breakdowns import windows_of
 from coramp.calibration.demand import saturated
+from coramp.calibration.desired_speeds import free_intervals
 from coramp.calibration.fit import fit_of, geh
 from coramp.calibration.free_speed import free_speed
 from coramp.calibration.moments import moments_of, names_of_moments, onset_s
@@ -125,6 +126,13 @@ def test_spread_of_drivers_shows_in_means_of_few():
     many = Series(0.0, 60.0, {"a": np.full(6, 4.0)}, {"a": np.array([19.0, 21.0] * 3)})
     found = free_speed(many, ["a"], np.ones(6, np.bool_))
     assert found.deviation_mps == pytest.approx(np.sqrt(6 * 4.0 / 5))
+
+
+def test_free_is_not_much_traffic_without_a_queue():
+    before = BROKEN.between(600.0, 1800.0)
+    # the most is 12, so that up to 10.2 is not much; the median is 10.5
+    assert free_intervals(before, SITE, 20.0, broke=True).tolist() == [1, 1, 0, 0]
+    assert free_intervals(before, SITE, 20.0, broke=False).tolist() == [1, 1, 0, 1]
 
 
 def test_a_queue_at_an_entry_hides_demand():

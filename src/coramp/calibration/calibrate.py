@@ -54,6 +54,11 @@ def calibrate_series(
     """
     rough_mps = rough_free_mps(data, site.upstream.id, QUANTILE)
     onset = onset_s(data, site, rough_mps)
+    if onset <= data.begin_s:
+        raise CorampError(
+            f"detector {site.upstream.id}: stands in a queue when the data begins; allowed is data "
+            "that begins with free traffic"
+        )
     ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id, 0.5)
     free = free_traffic(scenario, site, data, onset, (rough_mps, ramp_mps))
     if free.told.vehicles < LEAST_VEHICLES:

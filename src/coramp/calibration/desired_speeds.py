@@ -21,6 +21,7 @@ from coramp.scenarios.sections import DriverPopulation
 
 FREE_S = 3600.0
 """How much of the data before a breakdown is driven again for desired speeds."""
+FREE_SHARE = 0.85
 USUAL_DEVIATION, DEVIATIONS = 0.07, (0.002, 0.15)
 """Spread of desired speeds over v0: that of ``credible``, which is near by if the data does not
 tell, and in which range it is looked for."""
@@ -101,12 +102,29 @@ def free_traffic(
     """
     names = tuple(loop.id for loop in speed_loops(site, scenario.mainline.start_m))
     before = data.between(onset_s - FREE_S, onset_s)
-    free = ~queued(before, site.upstream.id, rough_mps[0])
+    free = free_intervals(before, site, rough_mps[0], onset_s < data.end_s)
     flows = before.vehicles[site.mainline_entry.id]
     little = free & (flows <= np.median(flows[free])) if free.any() else free
     told = free_speed(before, names, free)
     replayed = Replayed(scenario, site, before, (told.mean_mps, rough_mps[1]))
     return FreeTraffic(told, replayed, little, free & ~little, names)
+
+
+def free_intervals(series: Series, site: Site, free_mps: float, broke: bool) -> BoolArray:
+    """Returns which intervals are free: without a queue upstream, and without much traffic.
+
+    Much is more than 85 % of the highest flow of 5 min that leaves, or than the median where that
+    is more, if traffic ``broke`` down at the series' end; else the road could carry more.
+    """
+    coarse = series.coarse()
+    flows = coarse.flow_veh_h(site.downstream.id)
+    most = np.inf
+    if broke and len(flows):
+        most = max(FREE_SHARE * float(flows.max()), float(np.median(flows)))
+    little = np.repeat(flows <= most, round(coarse.interval_s / series.interval_s))
+    free = np.zeros(series.intervals, np.bool_)
+    free[: len(little)] = little
+    return free & ~queued(series, site.upstream.id, free_mps)
 
 
 def rough_free_mps(data: Series, detector: str, quantile: float) -> float:
