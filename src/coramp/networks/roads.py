@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from coramp.errors import CorampError
 from coramp.networks.graph import Edge, Network
+from coramp.networks.limits import Limits
 from coramp.networks.merging import onward_edge
 from coramp.networks.ramps import OnRamp
 
@@ -24,11 +25,14 @@ class ThroughRoad:
     """A road from its upstream end to its downstream end, and its merge sites downstream.
 
     ``starts_m`` is the distance along the road at which each edge begins, lanes inside junctions
-    included. ``exits`` are all edges by which traffic can leave it.
+    included; ``limits`` are by that distance. ``first_lanes`` is how many lanes its first edge has.
+    ``exits`` are all edges by which traffic can leave it.
     """
 
     edges: tuple[str, ...]
     starts_m: tuple[float, ...]
+    limits: Limits
+    first_lanes: int
     sites: tuple[OnRamp, ...]
     exits: tuple[Exit, ...]
 
@@ -105,9 +109,14 @@ def _road(network: Network, sites: list[OnRamp], exits: Sequence[str]) -> Throug
     wanted = [whole.index(way.after_edge) + 1 for way in ways if way.edge_id in exits]
     last = min(max([last, *wanted]), len(whole) - 1)
     edges = whole[: last + 1]
+    found = [network.edges[edge_id] for edge_id in edges]
+    starts_m = _starts_m(network, found)
+    lowest_mps = tuple(min(lane.limit_mps for lane in edge.lanes) for edge in found)
     return ThroughRoad(
         tuple(edges),
-        _starts_m(network, [network.edges[edge_id] for edge_id in edges]),
+        starts_m,
+        Limits(starts_m, lowest_mps),
+        len(found[0].lanes),
         tuple(sites),
         tuple(way for way in ways if way.after_edge in edges[:-1] or way.edge_id in exits),
     )
