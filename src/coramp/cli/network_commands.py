@@ -60,11 +60,18 @@ def ramps(
 @networks.command(
     "new-scenario",
     epilog="Example: coramp new-scenario a10 --net osm.net.xml --ramp 24498409@4054057\n\n"
-    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057",
+    "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057\n\n"
+    "Example: coramp new-scenario road --net road.net.xml --ramp on1@m1 --ramp on2@m2",
 )
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
-    ramp: Annotated[str, typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it.")],
+    ramp: Annotated[
+        list[str],
+        typer.Option(
+            metavar="ID",
+            help="The on-ramp, as coramp ramps has it; several, downstream, are a corridor.",
+        ),
+    ],
     net: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
     ] = None,
@@ -73,12 +80,12 @@ def new_scenario(
         typer.Option(metavar="FILE", help="An extract of OpenStreetMap, for netconvert."),
     ] = None,
 ) -> None:
-    """Write a scenario of an on-ramp in a SUMO network.
+    """Write a scenario of an on-ramp in a SUMO network, or of a corridor of several.
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
     from coramp.records.files import write_text
-    from coramp.scenarios.new_scenario import new_scenario_text, osm_network_beside
+    from coramp.scenarios.new_scenario import new_text, osm_network_beside
 
     if (net is None) == (osm is None):
         raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
@@ -88,5 +95,5 @@ def new_scenario(
     if net is None and osm is not None:
         net = osm_network_beside(osm, target)
     if net is not None:
-        write_text(target, new_scenario_text(target.stem, net, ramp, target.parent))
+        write_text(target, new_text(target.stem, net, ramp, target.parent))
     print(f"Written: {target}; now coramp run {target} --strategy mixed-slots")

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import tomli_w
 from coramp.errors import CorampError
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
+from coramp.scenarios.corridors import corridor_of
 from coramp.scenarios.defaults import with_defaults, with_populations
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.network_section import sha256_of
@@ -56,6 +58,35 @@ def new_scenario_text(name: str, network: Path, ramp_id: str, beside: Path) -> s
     return f"# {HEAD}\n{tomli_w.dumps(ordered)}"
 
 
+def new_text(name: str, network: Path, ramp_ids: Sequence[str], beside: Path) -> str:
+    """Returns the TOML text of a scenario of an on-ramp, or of a corridor of several.
+
+    Paths count from the folder ``beside``. Raises CorampError where coramp cannot drive there.
+    """
+    if len(ramp_ids) == 1:
+        return new_scenario_text(name, network, ramp_ids[0], beside)
+    section: dict[str, Any] = {
+        "file": str(network.absolute()),
+        "sha256": sha256_of(network),
+        "sites": list(ramp_ids),
+        "mainline_flow_veh_h": 0.0,
+        "ramp_flow_veh_h": [MODERATE_RAMP_VEH_H] * len(ramp_ids),
+    }
+    whole = corridor_of({"name": name, "corridor": section}, str(network))
+    lanes = [len(road.sites[0].mainline_edge.lanes) for road in whole.roads]
+    flows = [MODERATE_LANE_VEH_H * count for count in lanes]
+    section["file"] = _path_from(network, beside)
+    section["mainline_flow_veh_h"] = flows[0] if len(flows) == 1 else flows
+    exits = [way.edge_id for road in whole.roads for way in road.exits]
+    section["exits"] = [{"edge": edge_id, "share": EXIT_SHARE} for edge_id in exits]
+    data = {"name": name, "corridor": section}
+    corridor_of({**data, "corridor": {**section, "file": str(network.absolute())}}, name)
+    return f"# {CORRIDOR_HEAD}\n{tomli_w.dumps(data)}"
+
+
+EXIT_SHARE = 0.1
+"""The share of vehicles that leave at each exit of a new corridor."""
+CORRIDOR_HEAD = "Sites stand in the order of driving; set the flows, the exits' shares and what else you need."
 HEAD = "Lengths, lanes and limits are those of the network; set the flows and what else you need."
 
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.demand.corridor_demand import Traffic, traffic_of
+from coramp.records.corridor_outcome import CorridorOutcome
 from coramp.scenarios.corridors import Corridor
 from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import steps_of_period
@@ -26,33 +28,9 @@ from coramp.worlds.sumo.mixed_setup import Able, actuators_of, automated_types, 
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.uncontrolled import alone_among_drivers
 
-TRIPS = ("entered_s", "left_s", "waited_s", "driven_s", "lost_s", "length_m")
+TRIPS = ("entered_s", "left_s", "waiting_s", "driven_s", "lost_s", "way_m")
 LOOK_S = 0.2
 """How often who is in a zone is looked at where nobody coordinates."""
-
-
-@dataclass(frozen=True)
-class CorridorOutcome:
-    """What happened; arrays of ``trips`` have one entry a vehicle, those of tables one a row.
-
-    ``trips`` are SUMO's own figures: when it entered and left (s; nan where it never did), how long
-    it waited to enter, drove and lost against its wish. ``passages`` and ``hand_overs`` are as
-    ``corridor_record`` has them. ``collided`` are rear and front vehicle of each pair. ``messages``
-    has one entry a site; it is empty where nobody coordinates.
-    """
-
-    corridor: Corridor
-    traffic: tuple[Traffic, ...]
-    automated: BoolArray
-    trips: dict[str, FloatArray]
-    passages: dict[str, FloatArray]
-    hand_overs: dict[str, FloatArray]
-    free_s: FloatArray
-    plan_error_m: FloatArray
-    collided: tuple[tuple[float, int, int], ...]
-    messages: tuple[dict[str, int], ...]
-    end_s: float
-    most_present: int
 
 
 @dataclass(frozen=True)
@@ -145,7 +123,7 @@ def run_corridor(
             careless = [
                 Careless(scenario, session, seed + k) for k, scenario in enumerate(corridor.scenarios)
             ]
-            most_present, end_s = _drive(plant, sites, careless, cap_step_of(corridor.common))
+            most_at_once, end_s = _drive(plant, sites, careless, cap_step_of(corridor.common))
             messages = () if sites is None else tuple(sites.counts())
         files.keep()
         arrivals = [arrival for own in traffic for arrival in own.arrivals]
@@ -153,19 +131,37 @@ def run_corridor(
         plant.record.end()
         passages = plant.record.table(plant.record.passages, PASSAGE)
         return CorridorOutcome(
-            corridor,
-            tuple(traffic),
-            automated,
-            trips,
-            passages,
-            plant.record.table(plant.record.hand_overs, HAND_OVER),
-            _free_s(road, plant.able, passages),
-            plant.largest_error_m,
-            files.collided(arrivals),
-            messages,
-            max(end_s, horizon_s),
-            most_present,
+            corridor=corridor,
+            **_vehicles(corridor, traffic),
+            scheduled_s=np.array([arrival.step for arrival in arrivals]) * step_s,
+            automated=automated,
+            trips=trips,
+            passages=passages,
+            free_s=_free_s(road, plant.able, passages),
+            hand_overs=plant.record.table(plant.record.hand_overs, HAND_OVER),
+            plan_error_m=plant.largest_error_m if coordination else np.full(len(arrivals), np.nan),
+            collided=files.collided(arrivals),
+            messages=messages,
+            until_s=max(end_s, horizon_s),
+            most_at_once=most_at_once,
         )
+
+
+def _vehicles(corridor: Corridor, traffic: Sequence[Traffic]) -> dict[str, Any]:
+    """Who all vehicles are, where they come from, and by which exit they leave; None for none."""
+    vehicle_id: list[str] = []
+    origin: list[str] = []
+    leaves_by: list[str | None] = []
+    for own in traffic:
+        name = corridor.sites[own.origin.site].ramp_id if own.origin.on_ramp else own.origin.name
+        vehicle_id += [arrival.vehicle_id for arrival in own.arrivals]
+        origin += [name] * len(own.arrivals)
+        leaves_by += [None if k < 0 else own.exits[k].edge_id for k in own.leaves_by]
+    return {
+        "vehicle_id": tuple(vehicle_id),
+        "origin": tuple(origin),
+        "leaves_by": tuple(leaves_by),
+    }
 
 
 def _drive(
