@@ -8,7 +8,8 @@ import sumo
 
 NODES = """<nodes>
   <node id="west" x="0" y="0"/> <node id="nose1" x="800" y="0"/> <node id="end1" x="960" y="0"/>
-  <node id="fork" x="1500" y="0"/> <node id="nose2" x="2000" y="0"/> <node id="end2" x="2160" y="0"/>
+  <node id="fork" x="1500" y="0"/> <node id="nose2" x="2000" y="0"/>
+  <node id="end2" x="2160" y="0"/>
   <node id="east" x="2900" y="0"/>
   <node id="south1" x="400" y="-90"/> <node id="south2" x="1620" y="-90"/>
   <node id="out" x="1850" y="-120"/>
@@ -42,21 +43,31 @@ CONNECTIONS = """<connections>
   <connection from="merge2" to="d" fromLane="2" toLane="1"/>
 </connections>
 """
-SITES = ("on1@merge1", "on2@merge2")
 
 
-@pytest.fixture(scope="session")
-def network(tmp_path_factory):
-    """The network's file."""
-    folder = tmp_path_factory.mktemp("road")
+def built(folder, left_out=()):
+    """Returns the file of the road in a folder, without lines that name what is left out."""
     for name, text in (("nod", NODES), ("edg", EDGES), ("con", CONNECTIONS)):
-        (folder / f"road.{name}.xml").write_text(text)
+        lines = [line for line in text.splitlines() if not any(part in line for part in left_out)]
+        (folder / f"road.{name}.xml").write_text("\n".join(lines))
     command = [str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"), "--no-turnarounds"]
     for option, name in (("node", "nod"), ("edge", "edg"), ("connection", "con")):
         command += [f"--{option}-files", str(folder / f"road.{name}.xml")]
     command += ["--junctions.limit-turn-speed", "-1", "--output-file", str(folder / "road.net.xml")]
     subprocess.run(command, check=True, capture_output=True)
     return folder / "road.net.xml"
+
+
+@pytest.fixture(scope="session")
+def network(tmp_path_factory):
+    """The network's file."""
+    return built(tmp_path_factory.mktemp("road"))
+
+
+@pytest.fixture(scope="session")
+def without_exit(tmp_path_factory):
+    """The file of the same road without its exit."""
+    return built(tmp_path_factory.mktemp("without"), ('"off"', '"out"'))
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from coramp.api import CorridorResult, corridor
 from coramp.cli.console import print_json, print_table, tell_of_compiling, tell_of_demand, working
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
+from coramp.runs.corridors import processes_checked
 from coramp.scenarios.toml_files import parse_overrides
 from coramp.studies.tables import Table, number
 
@@ -47,6 +48,7 @@ def run_corridor_command(
                 "once"
             )
         overrides["simulation.horizon_s"] = float(horizon_s)
+    processes = processes_checked(1 if processes is None else processes)
     tell_of_compiling()
     with working("running"):
         result = corridor(
@@ -55,7 +57,7 @@ def run_corridor_command(
             drivers=drivers,
             overrides=overrides,
             seed=seed,
-            processes=1 if processes is None else processes,
+            processes=processes,
             out=out,
             keep_sumo=keep_sumo,
             gui=gui,

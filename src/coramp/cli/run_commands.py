@@ -91,7 +91,7 @@ def run(
             "--keep-messages": keep_messages or None,
             "--engine": None if engine == "sumo" else engine,
         }
-        result = run_corridor_command(
+        found = run_corridor_command(
             scenario,
             strategy,
             refused=[option for option, value in given.items() if value is not None],
@@ -106,7 +106,7 @@ def run(
             json=json,
             wide=wide,
         )
-        _exit_if_broken(result.broken_promises)
+        _exit_if_broken(found.broken_promises)
         return
     if processes is not None:
         raise CorampError(

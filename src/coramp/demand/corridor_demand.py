@@ -33,8 +33,9 @@ class Origin:
 
 @dataclass(frozen=True)
 class Traffic:
-    """The vehicles of one origin by time: who is automated, who reports, and by which way each
-    leaves; -1 stands for the road's end, else it is a place in ``exits``.
+    """The vehicles of one origin by time: who is automated, who reports, by which way each leaves.
+
+    ``leaves_by`` has -1 for the road's end, else a place in ``exits``.
     """
 
     origin: Origin
@@ -80,7 +81,9 @@ def _origins(corridor: Corridor, seed: int) -> list[Origin]:
             own = corridor.scenarios[place]
             none = own.mainline.model_copy(update={"flow_veh_h": 0.0, "flow_to_veh_h": None})
             ramp = own.model_copy(update={"mainline": none})
-            found.append(Origin(f"ramp{place + 1}", True, place, road, ramp, _seed(seed, site.ramp_id)))
+            found.append(
+                Origin(f"ramp{place + 1}", True, place, road, ramp, _seed(seed, site.ramp_id))
+            )
             place += 1
     return found
 

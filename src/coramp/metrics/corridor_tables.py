@@ -38,7 +38,9 @@ def totals_of(outcome: CorridorOutcome, sites: pl.DataFrame) -> Row:
     The delay is what they wait and what they lose against their wish.
     """
     trips = outcome.trips
-    waiting_s, driven_s, lost_s = (_sum(trips[name]) for name in ("waiting_s", "driven_s", "lost_s"))
+    waiting_s, driven_s, lost_s = (
+        _sum(trips[name]) for name in ("waiting_s", "driven_s", "lost_s")
+    )
     vehicles, through = len(outcome.vehicle_id), int((~np.isnan(trips["left_s"])).sum())
     errors_m = outcome.plan_error_m[~np.isnan(outcome.plan_error_m)]
     return {

@@ -79,7 +79,9 @@ def _check_order(network: Network, site: OnRamp, groups: list[list[OnRamp]]) -> 
             ahead = onward(network, site.merge_edge.edge_id)
             behind = onward(network, other.merge_edge.edge_id)
             if other.merge_edge.edge_id in ahead or site.merge_edge.edge_id in behind:
-                first, second = (site, other) if other.merge_edge.edge_id in ahead else (other, site)
+                first, second = (
+                    (site, other) if other.merge_edge.edge_id in ahead else (other, site)
+                )
                 raise CorampError(
                     f"{first.ramp_id} lies upstream of {second.ramp_id}; allowed are the sites of "
                     "a road one after the other, in the order of driving"

@@ -85,8 +85,9 @@ TOTALS = (
 
 @dataclass(frozen=True)
 class CorridorOutcome:
-    """What happened; arrays have one entry a vehicle, those of ``passages`` and ``hand_overs`` a row.
+    """What happened; arrays have one entry a vehicle.
 
+    Those of ``passages`` and ``hand_overs`` have one a row.
     ``trips`` are SUMO's own figures: when each vehicle entered and left (s; nan where it never
     did), how long it waited to enter, drove and lost against its wish, and how far it went.
     ``collided`` are time (s), rear and front vehicle of each pair. ``messages`` has one entry a

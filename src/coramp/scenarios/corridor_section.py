@@ -1,4 +1,4 @@
-"""The table ``[corridor]``: merge sites one behind the other in a SUMO network, and their traffic."""
+"""The table ``[corridor]``: merge sites in a SUMO network one behind the other, their traffic."""
 
 from typing import Annotated
 
@@ -30,7 +30,9 @@ class CorridorSection(BaseModel):
 
     file: Annotated[str, Field(min_length=1)]
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    sites: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1, strict=False)]
+    sites: Annotated[
+        tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1, strict=False)
+    ]
     mainline_flow_veh_h: Flow | Annotated[tuple[Flow, ...], Field(strict=False)]
     ramp_flow_veh_h: Annotated[tuple[Flow, ...], Field(strict=False)]
     exits: Annotated[tuple[ExitShare, ...], Field(strict=False)] = ()

@@ -13,6 +13,7 @@ from coramp.networks.graph import Network
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import OnRamp, on_ramps
 from coramp.networks.roads import ThroughRoad, roads_of
+from coramp.networks.steady import on_steady_mainline
 from coramp.scenarios.corridor_section import CorridorSection
 from coramp.scenarios.defaults import with_defaults, with_populations
 from coramp.scenarios.model import Scenario
@@ -113,8 +114,8 @@ def corridor_of(
     """Returns the corridor of a scenario file's content; ``label`` is the file, for errors."""
     if given := [key for key in OF_SITES if key in data]:
         raise CorampError(
-            f"{label}: {given[0]}: stands beside [corridor], whose network tells the roads and whose "
-            "keys the flows; allowed is [corridor] alone"
+            f"{label}: {given[0]}: stands beside [corridor], whose network tells the roads and "
+            "whose keys the flows; allowed is [corridor] alone"
         )
     blamed = blamed or {}
     section = validated(_Whole, {TABLE: data[TABLE]}, label, blamed).corridor
@@ -157,9 +158,10 @@ def _roads(section: CorridorSection) -> tuple[ThroughRoad, ...]:
             raise CorampError(
                 f"{TABLE}.sites: there is no on-ramp {ramp_id!r}; allowed are {known}"
             )
-        if reason := reason_against(ramps[ramp_id]):
+        site = on_steady_mainline(ramps[ramp_id])
+        if reason := reason_against(site):
             raise CorampError(f"{TABLE}.sites: {ramp_id} cannot be coordinated: {reason}")
-        sites.append(ramps[ramp_id])
+        sites.append(site)
     try:
         return roads_of(network, sites, [way.edge for way in section.exits])
     except CorampError as error:
@@ -219,8 +221,8 @@ def _zone(section: CorridorSection, site: OnRamp) -> Zone:
     to_m = min(lane_end_m + section.downstream_m, road_m - LOOK_M)
     if to_m < lane_end_m:
         raise CorampError(
-            f"{TABLE}.sites: {site.ramp_id}: its road goes on for {road_m - lane_end_m:.0f} m behind "
-            f"the acceleration lane before other traffic joins or leaves; allowed is {LOOK_M:g} m "
+            f"{TABLE}.sites: {site.ramp_id}: its road goes on for {road_m - lane_end_m:.0f} m "
+            f"behind the acceleration lane before other traffic joins or leaves; allowed is {LOOK_M:g} m "
             "or more"
         )
     return Zone(

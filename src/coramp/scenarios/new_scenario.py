@@ -86,7 +86,9 @@ def new_text(name: str, network: Path, ramp_ids: Sequence[str], beside: Path) ->
 
 EXIT_SHARE = 0.1
 """The share of vehicles that leave at each exit of a new corridor."""
-CORRIDOR_HEAD = "Sites stand in the order of driving; set the flows, the exits' shares and what else you need."
+CORRIDOR_HEAD = (
+    "Sites stand in the order of driving; set the flows, the exits' shares and what else you need."
+)
 HEAD = "Lengths, lanes and limits are those of the network; set the flows and what else you need."
 
 

@@ -3,10 +3,10 @@
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from coramp.records.corridor_outcome import CorridorOutcome
 from coramp.scenarios.corridors import Corridor
 from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import steps_of_period
+from coramp.worlds.faults.actuators import SlowActuators
 from coramp.worlds.outcomes import cap_step_of
 from coramp.worlds.sumo.careless import Careless
 from coramp.worlds.sumo.corridor_plant import CorridorPlant, ZoneUsers
@@ -85,66 +86,143 @@ def run_corridor(
     options: SumoOptions,
 ) -> CorridorOutcome:
     """Returns what happened on a corridor: coordinated by sites, or with drivers alone."""
-    drivers, road = corridor.common.drivers[population], corridor_road(corridor)
-    traffic = traffic_of(corridor, seed)
-    step_s, horizon_s = corridor.common.control.step_s, corridor.common.simulation.horizon_s
-    period_steps = steps_of_period(coordination.decision_s if coordination else LOOK_S, step_s)
-    actuators = actuators_of(corridor.common, sum(len(own.arrivals) for own in traffic))
-    period_s = period_steps * step_s
-    kinds = _kinds(traffic, coordination, period_s, actuators.delay_s)
-    automated = np.concatenate(
-        [
-            np.zeros(len(own.arrivals), np.bool_) if found is None else found.vehicles
-            for own, found in zip(traffic, kinds, strict=True)
-        ]
-    )
+    planned = _planned(corridor, coordination, corridor.common.drivers[population], seed)
+    step_s, road = corridor.common.control.step_s, planned.road
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
-        ballistic = coordination is None and drivers.integrator == "ballistic"
+        ballistic = coordination is None and planned.drivers.integrator == "ballistic"
         files = CorridorFiles(Path(name), corridor.common, road, seed, options, ballistic)
-        files.write_routes(corridor_routes(corridor, drivers, traffic, kinds, road))
+        files.write_routes(corridor_routes(planned.drivers, planned.traffic, planned.kinds, road))
         files.write_additional()
-        setups = []
-        if coordination is not None:
-            setups = _setups(corridor, coordination, drivers, traffic, (period_s, actuators.delay_s), seed)
-        running = sites_running(setups, coordination.processes) if coordination else nullcontext()
-        with running as sites, Session(files.options(), step_s, options.gui, options.tell) as session:
-            plant = CorridorPlant(
-                session,
-                {},
-                _able(traffic, automated),
-                period_steps,
-                step_s,
-                max((found.min_gap_m for found in kinds if found is not None), default=0.0),
-                actuators,
-                corridor=road,
-                record=CorridorRecord(len(automated), period_s),
-                commands=coordination is not None,
-            )
+        running = nullcontext() if coordination is None else planned.sites_running(coordination)
+        with (
+            running as sites,
+            Session(files.options(), step_s, options.gui, options.tell) as session,
+        ):
+            plant = planned.plant(session, coordination is not None)
             careless = [
-                Careless(scenario, session, seed + k) for k, scenario in enumerate(corridor.scenarios)
+                Careless(scenario, session, seed + k)
+                for k, scenario in enumerate(corridor.scenarios)
             ]
-            most_at_once, end_s = _drive(plant, sites, careless, cap_step_of(corridor.common))
-            messages = () if sites is None else tuple(sites.counts())
+            driven = _drive(plant, sites, careless, cap_step_of(corridor.common))
         files.keep()
-        arrivals = [arrival for own in traffic for arrival in own.arrivals]
-        trips = files.trips(dict(plant.able.number))
-        plant.record.end()
-        passages = plant.record.table(plant.record.passages, PASSAGE)
-        return CorridorOutcome(
-            corridor=corridor,
-            **_vehicles(corridor, traffic),
-            scheduled_s=np.array([arrival.step for arrival in arrivals]) * step_s,
-            automated=automated,
-            trips=trips,
-            passages=passages,
-            free_s=_free_s(road, plant.able, passages),
-            hand_overs=plant.record.table(plant.record.hand_overs, HAND_OVER),
-            plan_error_m=plant.largest_error_m if coordination else np.full(len(arrivals), np.nan),
-            collided=files.collided(arrivals),
-            messages=messages,
-            until_s=max(end_s, horizon_s),
-            most_at_once=most_at_once,
+        return _outcome(planned, plant, files, driven)
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """All that a run begins with; ``kinds`` is how SUMO knows each origin's automated vehicles."""
+
+    corridor: Corridor
+    drivers: DriverPopulation
+    seed: int
+    road: CorridorRoad
+    traffic: tuple[Traffic, ...]
+    kinds: tuple[Automated | None, ...]
+    period_steps: int
+    actuators: SlowActuators
+
+    @property
+    def period_s(self) -> float:
+        """The time (s) between two looks at the zones."""
+        return self.period_steps * self.corridor.common.control.step_s
+
+    @property
+    def automated(self) -> BoolArray:
+        """Who is automated, in the order of origins."""
+        return np.concatenate(
+            [
+                np.zeros(len(own.arrivals), np.bool_) if found is None else found.vehicles
+                for own, found in zip(self.traffic, self.kinds, strict=True)
+            ]
         )
+
+    def plant(self, session: Session, commands: bool) -> CorridorPlant:
+        """Returns the vehicles of a session."""
+        automated = self.automated
+        return CorridorPlant(
+            session,
+            {},
+            _able(self.traffic, automated),
+            self.period_steps,
+            self.corridor.common.control.step_s,
+            max((found.min_gap_m for found in self.kinds if found is not None), default=0.0),
+            self.actuators,
+            corridor=self.road,
+            record=CorridorRecord(len(automated), self.period_s),
+            commands=commands,
+        )
+
+    def sites_running(self, coordination: Coordination) -> AbstractContextManager[Sites]:
+        """Gives each site's coordinator; each has links with random numbers of its own."""
+        automated = self.automated
+        reporting = automated | np.concatenate([own.reporting for own in self.traffic])
+        delay_s = self.actuators.delay_s
+        setups = [
+            SiteSetup(
+                scenario,
+                coordination.strategy,
+                laws_of(scenario, self.drivers, self.period_s, delay_s),
+                automated,
+                reporting,
+                scenario.commands.delay_s + delay_s,
+                self.seed + k,
+            )
+            for k, scenario in enumerate(self.corridor.scenarios)
+        ]
+        return sites_running(setups, coordination.processes)
+
+
+def _planned(
+    corridor: Corridor, coordination: Coordination | None, drivers: DriverPopulation, seed: int
+) -> _Planned:
+    traffic, step_s = tuple(traffic_of(corridor, seed)), corridor.common.control.step_s
+    steps = steps_of_period(coordination.decision_s if coordination else LOOK_S, step_s)
+    actuators = actuators_of(corridor.common, sum(len(own.arrivals) for own in traffic))
+    kinds: list[Automated | None] = []
+    for own in traffic:
+        scenario = own.origin.scenario
+        if coordination is None:
+            kinds.append(alone_among_drivers(scenario, own.arrivals, own.origin.seed))
+        else:
+            period_s = steps * step_s
+            kinds.append(automated_types(scenario, own.automated, period_s, actuators.delay_s))
+    road = corridor_road(corridor)
+    return _Planned(corridor, drivers, seed, road, traffic, tuple(kinds), steps, actuators)
+
+
+class _DrivenUntil(NamedTuple):
+    """When SUMO was left, how many were looked at at most, and what became of messages by site."""
+
+    until_s: float
+    most_at_once: int
+    messages: tuple[dict[str, int], ...]
+
+
+def _outcome(
+    planned: _Planned, plant: CorridorPlant, files: CorridorFiles, driven: _DrivenUntil
+) -> CorridorOutcome:
+    """What happened, once SUMO has ended."""
+    corridor, record = planned.corridor, plant.record
+    arrivals = [arrival for own in planned.traffic for arrival in own.arrivals]
+    record.end()
+    passages = record.table(record.passages, PASSAGE)
+    step_s, horizon_s = corridor.common.control.step_s, corridor.common.simulation.horizon_s
+    promised_m = plant.largest_error_m if plant.commands else np.full(len(arrivals), np.nan)
+    return CorridorOutcome(
+        corridor=corridor,
+        **_vehicles(corridor, planned.traffic),
+        scheduled_s=np.array([arrival.step for arrival in arrivals]) * step_s,
+        automated=planned.automated,
+        trips=files.trips(dict(plant.able.number)),
+        passages=passages,
+        free_s=_free_s(planned.road, plant.able, passages),
+        hand_overs=record.table(record.hand_overs, HAND_OVER),
+        plan_error_m=promised_m,
+        collided=files.collided(arrivals),
+        messages=driven.messages,
+        until_s=max(driven.until_s, horizon_s),
+        most_at_once=driven.most_at_once,
+    )
 
 
 def _vehicles(corridor: Corridor, traffic: Sequence[Traffic]) -> dict[str, Any]:
@@ -166,8 +244,8 @@ def _vehicles(corridor: Corridor, traffic: Sequence[Traffic]) -> dict[str, Any]:
 
 def _drive(
     plant: CorridorPlant, sites: Sites | None, careless: Sequence[Careless], cap_step: int
-) -> tuple[int, float]:
-    """Lets SUMO run until it is empty; returns how many were looked at at most, and when it ends."""
+) -> _DrivenUntil:
+    """Lets SUMO run until it is empty."""
     step, most = 0, 0
     while step < cap_step and (step == 0 or plant.session.vehicles_left()):
         step = min(cap_step, step + plant.period_steps)
@@ -187,7 +265,8 @@ def _drive(
                 for found in zip(zones, answers, careless, strict=True)
             ],
         )
-    return most, step * plant.step_s
+    messages = () if sites is None else tuple(sites.counts())
+    return _DrivenUntil(step * plant.step_s, most, messages)
 
 
 def _let_happen(now_s: float, zone: ZoneUsers, careless: Careless) -> None:
@@ -206,46 +285,6 @@ def _with_breakdown(
     return answer._replace(accel_mps2=accel_mps2)
 
 
-def _kinds(
-    traffic: Sequence[Traffic], coordination: Coordination | None, period_s: float, delay_s: float
-) -> list[Automated | None]:
-    """How SUMO knows each origin's automated vehicles; None where there are none."""
-    if coordination is None:
-        return [
-            alone_among_drivers(own.origin.scenario, own.arrivals, own.origin.seed)
-            for own in traffic
-        ]
-    return [
-        automated_types(own.origin.scenario, own.automated, period_s, delay_s) for own in traffic
-    ]
-
-
-def _setups(
-    corridor: Corridor,
-    coordination: Coordination,
-    drivers: DriverPopulation,
-    traffic: Sequence[Traffic],
-    times_s: tuple[float, float],
-    seed: int,
-) -> list[SiteSetup]:
-    """What each site's coordinator is made of; each has links with random numbers of its own."""
-    automated = np.concatenate([own.automated for own in traffic])
-    reporting = automated | np.concatenate([own.reporting for own in traffic])
-    period_s, delay_s = times_s
-    return [
-        SiteSetup(
-            scenario,
-            coordination.strategy,
-            laws_of(scenario, drivers, period_s, delay_s),
-            automated,
-            reporting,
-            scenario.commands.delay_s + delay_s,
-            seed + k,
-        )
-        for k, scenario in enumerate(corridor.scenarios)
-    ]
-
-
 def _able(traffic: Sequence[Traffic], automated: BoolArray) -> Able:
     """What all vehicles can do, in the order of origins."""
     parts, first = [], 0
@@ -259,7 +298,13 @@ def _able(traffic: Sequence[Traffic], automated: BoolArray) -> Able:
         automated,
         *(
             np.concatenate([getattr(part, name) for part in parts])
-            for name in ("length_m", "cruise_mps", "acceleration_mps2", "power_wpkg", "braking_mps2")
+            for name in (
+                "length_m",
+                "cruise_mps",
+                "acceleration_mps2",
+                "power_wpkg",
+                "braking_mps2",
+            )
         ),
     )
 
@@ -276,4 +321,3 @@ def _free_s(road: CorridorRoad, able: Able, passages: dict[str, FloatArray]) -> 
             known[key] = road.sites[key[0]].free_s(on_ramp, cruise_mps)
         found[k] = known[key]
     return found
-

@@ -104,8 +104,10 @@ class CorridorPlant(LanedPlant):
         )
 
     def _speeds(self, found: Found, placed: Sequence[Placed]) -> FloatArray:
-        """What is known of speeds; who is commanded must be where it was sent, in its site's zone."""
-        held = np.array([self._held.get(n, ("", NO_SITE))[1] for n in found.number.tolist()], np.int64)
+        """What is known of speeds; who is commanded is to be where it was sent, in its zone."""
+        held = np.array(
+            [self._held.get(n, ("", NO_SITE))[1] for n in found.number.tolist()], np.int64
+        )
         station_m = np.full(len(found.number), np.nan)
         for k, own in enumerate(placed):
             of_site = held[own.place] == k
@@ -261,5 +263,3 @@ def _place_in(own: Placed, place: int) -> tuple[float, float]:
     if len(there) == 0:
         return np.nan, np.nan
     return float(own.station_m[there[0]]), float(own.lane[there[0]])
-
-

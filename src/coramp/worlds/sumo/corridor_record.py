@@ -1,4 +1,4 @@
-"""What is kept of a corridor's run while it goes on: who passed which zone, and who was handed over.
+"""What is kept of a corridor's run as it goes on: who passed which zone, who was handed over.
 
 Rows are added as vehicles leave a zone. What is kept of positions is that of who is in a zone.
 """

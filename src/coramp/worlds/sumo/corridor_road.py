@@ -45,10 +45,8 @@ class SiteRoad:
         return self.zone.ramp_from_m if on_ramp else self.zone.from_m
 
     def free_s(self, on_ramp: bool, cruise_mps: float) -> float:
-        """Returns the time (s) through the zone at a speed, or at the limits where these are lower."""
-        return _free_s(
-            self.limits(on_ramp), self.from_m(on_ramp), self.zone.to_m, cruise_mps
-        )
+        """Returns the time (s) through the zone at a speed, or at lower limits where there are."""
+        return _free_s(self.limits(on_ramp), self.from_m(on_ramp), self.zone.to_m, cruise_mps)
 
 
 def _free_s(limits: Limits, from_m: float, to_m: float, cruise_mps: float) -> float:
@@ -87,11 +85,13 @@ class CorridorRoad:
 
     @property
     def additional(self) -> str | None:
-        """What SUMO is told beside the network: lanes of ramps that are closed; None without any."""
+        """What SUMO is told beside the network: closed lanes of ramps; None without any."""
         closed = [(k, own.road.closed) for k, own in enumerate(self.sites) if own.road.closed]
         if not closed:
             return None
-        return "\n".join(["<additional>", *(_closing(*found) for found in closed), "</additional>", ""])
+        return "\n".join(
+            ["<additional>", *(_closing(*found) for found in closed), "</additional>", ""]
+        )
 
 
 def _closing(number: int, closed: Sequence[str]) -> str:
@@ -128,7 +128,6 @@ def _lanes(site: OnRamp, zone: Zone) -> dict[str, LaneSpan]:
 
 
 def corridor_routes(
-    corridor: Corridor,
     drivers: DriverPopulation,
     traffic: Sequence[Traffic],
     automated: Sequence[Automated | None],
@@ -155,7 +154,9 @@ def corridor_routes(
             origin.scenario, drivers, own.arrivals, traits, kinds, _ways(origin, road, route_of)
         )
         renamed = {name: f"{origin.name}-{name}" for name in found}
-        types += [line.replace(f'id="{name}"', f'id="{renamed[name]}"') for name, line in found.items()]
+        types += [
+            line.replace(f'id="{name}"', f'id="{renamed[name]}"') for name, line in found.items()
+        ]
         for arrival, line in zip(own.arrivals, lines, strict=True):
             kind = line.split('type="', 1)[1].split('"', 1)[0]
             named = line.replace(f'type="{kind}"', f'type="{renamed[kind]}"')

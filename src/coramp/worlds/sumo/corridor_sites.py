@@ -99,7 +99,7 @@ class SiteCoordinator:
         )
 
     def handle(self, view: SiteView) -> SiteAnswer:
-        """Returns what the vehicles that the coordinator is told of are to do until the next time."""
+        """Returns what those of whom the coordinator is told are to do until the next time."""
         users = view.users
         if not users.automated.any():
             return SiteAnswer(np.zeros(len(users.number)), np.zeros(len(users.number), np.bool_))
@@ -198,11 +198,11 @@ def sites_running(setups: Sequence[SiteSetup], processes: int) -> Iterator[Sites
     finally:
         for line in lines:
             line.close()
-        for worker in workers:
-            worker.join(ENDS_WITHIN_S)
-            if worker.is_alive():
-                worker.terminate()
-                worker.join()
+        for started in workers:
+            started.join(ENDS_WITHIN_S)
+            if started.is_alive():
+                started.terminate()
+                started.join()
 
 
 def _serve(line: Connection, setups: Sequence[SiteSetup]) -> None:
