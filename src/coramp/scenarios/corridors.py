@@ -222,8 +222,8 @@ def _zone(section: CorridorSection, site: OnRamp) -> Zone:
     if to_m < lane_end_m:
         raise CorampError(
             f"{TABLE}.sites: {site.ramp_id}: its road goes on for {road_m - lane_end_m:.0f} m "
-            f"behind the acceleration lane before other traffic joins or leaves; allowed is {LOOK_M:g} m "
-            "or more"
+            "behind the acceleration lane before other traffic joins or leaves; allowed is "
+            f"{LOOK_M:g} m or more"
         )
     return Zone(
         from_m=-min(section.upstream_m, site.mainline_m),
