@@ -59,7 +59,7 @@ def seen_of(*ways):
         np.array(time_s),
         np.array(station_m),
         np.array(speed_mps),
-        np.array(on_mainline, np.bool_),
+        np.where(on_mainline, 0, -1),
         np.full(len(ways), 5.0),
         np.array([way.automated for way in ways], np.bool_),
     )

@@ -85,6 +85,6 @@ def outcome_of(cars, end_s, **rest):
         else:
             vehicle = np.repeat(np.arange(len(cars)), np.diff(first))
             content["lanes"] = seen_history(
-                vehicle, content["lane"] == MAINLINE, rows[:, 0], until_s
+                vehicle, np.maximum(content["lane"] - MAINLINE, -1), rows[:, 0], until_s
             )
     return Outcome(passages=passages, pieces=pieces, end_s=end_s, **content)

@@ -32,7 +32,7 @@ def found_in(*ways, mass_kg=1500.0):
         rows[:, 0],
         rows[:, 1],
         rows[:, 2],
-        rows[:, 3] > 0.5,
+        np.where(rows[:, 3] > 0.5, 0, -1),
         np.full(len(ways), LENGTH_M),
         np.zeros(len(ways), np.bool_),
     )

@@ -66,12 +66,12 @@ def ramps(
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
     ramp: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             metavar="ID",
-            help="The on-ramp, as coramp ramps has it; several, downstream, are a corridor.",
+            help="The on-ramp, as coramp ramps has it (default: the one); several are a corridor.",
         ),
-    ],
+    ] = None,
     net: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
     ] = None,
@@ -84,16 +84,15 @@ def new_scenario(
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
-    from coramp.records.files import write_text
-    from coramp.scenarios.new_scenario import new_text, osm_network_beside
+    from coramp.scenarios.new_scenario import write_new_scenario, write_new_scenario_of_osm
 
-    if (net is None) == (osm is None):
-        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
     target = Path(f"{name}.toml")
     if target.exists():
         raise CorampError(f"{target}: is there already; give another name, or move it away")
-    if net is None and osm is not None:
-        net = osm_network_beside(osm, target)
-    if net is not None:
-        write_text(target, new_text(target.stem, net, ramp, target.parent))
+    if net is not None and osm is None:
+        write_new_scenario(target, net, ramp or [])
+    elif osm is not None and net is None:
+        write_new_scenario_of_osm(target, osm, ramp or [])
+    else:
+        raise CorampError("--net, --osm: allowed is one of them: a network, or what to make it of")
     print(f"Written: {target}; now coramp run {target} --strategy mixed-slots")

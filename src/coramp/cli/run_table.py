@@ -77,6 +77,10 @@ def _traffic_lines(figures: _Figures) -> Iterator[tuple[str, str]]:
     for stream in STREAMS:
         name = f"{figures.named(f'{stream}_speed_mps')}: mean, over 1 s bins ±"
         yield name, figures.text(f"{stream}_speed_mps", f"{stream}_speed_std_mps")
+    if figures.summary["outer_lane_delay_s"] is not None:
+        yield figures.alike("outer_lane_delay_s")
+    if figures.summary["made_way"] is not None:
+        yield figures.alike("made_way")
     yield figures.alike("vehicles_mainline", "vehicles_ramp", "unserved")
     yield figures.alike("fuel_l")
 

@@ -107,6 +107,14 @@ def _number(value: float | None) -> str:
 
 
 def _changes(row: Row) -> str:
+    if row["lane"] == "mainline":
+        after = row["after_vehicle_id"]
+        whom = f"for {after}, which is to merge ahead of it" if after else "for who merges"
+        return (
+            f"makes way {whom}: changes to the lane further in, at station {row['station_m']:.1f} "
+            f"m and {row['speed_mps']:.1f} m/s, and need not slow down by "
+            f"{_number(-row['told_mps2'])} m/s2"
+        )
     front, rear = row["front_vehicle_id"], row["rear_vehicle_id"]
     where = " and ".join(
         f"{word} {name}" for word, name in (("behind", front), ("ahead of", rear)) if name

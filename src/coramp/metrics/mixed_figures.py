@@ -17,7 +17,7 @@ from coramp.metrics.conflicts import conflicts_of
 from coramp.metrics.frames import frame_of
 from coramp.metrics.motion import distance_of_each_m, hard_brakings, stopped_vehicles
 from coramp.metrics.types import traits_of
-from coramp.mixed.laws import SafetyLaw
+from coramp.mixed.laws import LANE_END_M, SafetyLaw
 from coramp.records.outcome import Outcome, Pieces
 from coramp.records.schemas import MIXED_METRICS, SAFETY_EVENTS, Row
 from coramp.road.lanes import MAINLINE
@@ -101,7 +101,7 @@ def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:
         max(drivers.taus_s),
         law.relax_m,
         law.relax_at_end_m,
-        law.lane_end_m,
+        scenario.ramp.acceleration_lane_m - LANE_END_M,
     )
 
 

@@ -24,6 +24,7 @@ from coramp.metrics.motion import (
 )
 from coramp.metrics.queues import queue_figures
 from coramp.metrics.safety_figures import safety_figures, violations_table
+from coramp.metrics.several_lanes import several_lanes_figures
 from coramp.metrics.types import (
     free_flow_of_each_s,
     fuel_models_of,
@@ -184,6 +185,7 @@ def tables_of(outcome: Outcome, scenario: Scenario) -> RunTables:
         **braking_figures(outcome, scenario),
         **queue_figures(outcome, scenario),
         **mixed_figures(outcome, scenario, vehicles["delay_s"]),
+        **several_lanes_figures(outcome, scenario, vehicles["delay_s"]),
     }
     return RunTables(outcome, scenario, vehicles, speeds, metrics, streams)
 

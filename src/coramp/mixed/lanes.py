@@ -17,7 +17,7 @@ ENDLESS_M = 1e6
 """A lane of the mainline does not end: nobody may be nearer there than he keeps."""
 HELD_MPS2 = -0.2
 """Who is told to slow down by so much, or more, for a vehicle that merges may make way instead."""
-GAIN_MPS2 = 0.3
+GAIN_MPS2 = 0.2
 """By so much at least it must be able to drive with more in the other lane."""
 
 

@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 from coramp.mixed.users import Gaps, MixedRoad
 
+LANE_END_M = 3.0
+"""An automated vehicle that has not merged stands so far before the acceleration lane ends."""
+
 
 class FollowingLaw(NamedTuple):
     """How an automated vehicle follows: a = k_g (gap - s_0 - T v) + k_v (v_l - v) + k_a a_l.

@@ -92,6 +92,15 @@ class Found:
     links: tuple[str, ...]
     equals: tuple[str, ...]
 
+    def only(self) -> OnRamp:
+        """Returns the one on-ramp that there is; raises CorampError for more, or none."""
+        if len(self.ramps) == 1:
+            return self.ramps[0]
+        known = ", ".join(ramp.ramp_id for ramp in self.ramps)
+        if not known:
+            raise CorampError("there is no on-ramp; allowed is a network with one")
+        raise CorampError(f"there are {len(self.ramps)} on-ramps; choose one by --ramp: {known}")
+
     def named(self, ramp_id: str) -> OnRamp:
         """Returns the on-ramp of an id; raises CorampError where there is none such."""
         for ramp in self.ramps:

@@ -19,7 +19,8 @@ class Passages:
     ``merge_s`` is when a ramp vehicle changed to the mainline, ``BY_MAINLINE_S`` of
     ``vehicles.merge_state`` for mainline vehicles. ``entry_speed_mps`` is the scheduled one.
     ``plan_error_m`` is the largest distance seen between plan and simulator, nan without a plan.
-    ``automated`` tells, where drivers and automated vehicles mix, which are automated.
+    ``automated`` tells, where drivers and automated vehicles mix, which are automated. ``lane`` is
+    that of the mainline by which each enters, 0 next to the ramp.
     ``traits`` are None for vehicles that only the common limits bind; types and traits may be left
     out where that is so for all.
     """
@@ -36,6 +37,7 @@ class Passages:
     vehicle_type: tuple[str, ...] = ()
     traits: tuple[Traits | None, ...] = ()
     automated: BoolArray | None = None
+    lane: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __len__(self) -> int:
         return len(self.vehicle_id)

@@ -10,7 +10,7 @@ Row = dict[str, Any]
 """One row of a table, by column."""
 Schema = dict[str, type[pl.DataType] | pl.DataType]
 
-RESULT_VERSION = 7
+RESULT_VERSION = 8
 """Raised whenever the same specification gives other numbers or other columns."""
 
 VEHICLES: Schema = {
@@ -271,7 +271,10 @@ MIXED_METRICS: Schema = {
 Conflicts are also of drivers alone where the world is not perfect.
 """
 
-RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS, **MIXED_METRICS}
+LANE_METRICS: Schema = {"outer_lane_delay_s": pl.Float64, "made_way": pl.Int64}
+"""Figures of roads with several mainline lanes, null in other runs."""
+
+RUN_METRICS: Schema = {**_FIRST_METRICS, **_LATER_METRICS, **MIXED_METRICS, **LANE_METRICS}
 
 RUNS: Schema = {
     "run_id": pl.String,
@@ -286,6 +289,7 @@ RUNS: Schema = {
     **_LATER_METRICS,
     "settings": pl.String,
     **MIXED_METRICS,
+    **LANE_METRICS,
 }
 """``settings`` are the overrides as JSON, a dotted key each; ``overrides`` shows them."""
 PLANNING_TIMES = ("planning_median_s", "planning_p95_s")

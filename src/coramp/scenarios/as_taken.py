@@ -15,9 +15,11 @@ from coramp.scenarios.world_sections import TABLES as OF_THE_WORLD
 
 STATIONS = ("decision_station_m", "stop_station_m", "detector_station_m", "signal_station_m")
 TABLES = ("mainline", "ramp", "vehicle", "safety", "motion", "control", "simulation", "traffic")
+NETWORK = "network"
 SHARES = ("mainline_automated_share", "ramp_automated_share")
 FOLLOWS, DEFAULT = "follows from", "default"
 SOURCES = {
+    "ramp.decision_station_m": "start_m",
     "ramp.stop_station_m": "the speeds and the acceleration lane",
     "ramp.detector_station_m": "acceleration_lane_m",
     "ramp.signal_station_m": "start_m",
@@ -57,7 +59,7 @@ def taken(name: str) -> tuple[Scenario, list[Taken]]:
 
 
 def _keys(scenario: Scenario, data: Mapping[str, Any]) -> Iterator[Taken]:
-    for table in TABLES:
+    for table in TABLES if scenario.network is None else (NETWORK, *TABLES):
         given = data.get(table, {})
         model = getattr(scenario, table)
         for key, field in type(model).model_fields.items():
@@ -100,7 +102,7 @@ def _keys_of_world(
 
 
 def _why_there(scenario: Scenario, key: str) -> str:
-    if key != "decision_station_m":
+    if key != "decision_station_m" or not scenario.has_one_lane:
         return _from(f"ramp.{key}")
     first_m, last_m = decision_station_range_m(scenario)
     return f"{FOLLOWS} the range that is possible, {first_m:.1f} to {last_m:.1f}"

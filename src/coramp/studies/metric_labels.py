@@ -87,6 +87,8 @@ LABELS: dict[str, MetricLabel] = {
     "conflicts_j_1": MetricLabel("lane changes with J above (0.3 g)2", digits=0),
     "conflicts_j_10": MetricLabel("lane changes with J above 10 (0.3 g)2", digits=0),
     "conflicts_j_100": MetricLabel("lane changes with J above 100 (0.3 g)2", digits=0),
+    "outer_lane_delay_s": MetricLabel("delay of who enters on the lane next to the ramp", "s"),
+    "made_way": MetricLabel("automated vehicles that made way", digits=0),
     "interventions": MetricLabel("unsafe commands that were replaced", digits=0),
     "adjusted_vehicles": MetricLabel("vehicles adjusted for others", digits=0),
     "planning_ms": MetricLabel("planning", "ms", 3),

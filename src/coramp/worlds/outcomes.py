@@ -104,4 +104,5 @@ def passages_of(
         plan_error_m,
         columns.vehicle_type,
         columns.traits,
+        lane=np.array(columns.lane, np.int64),
     )

@@ -117,9 +117,7 @@ def driver_routes(
     """
     types, vehicles = driver_lines(scenario, drivers, arrivals, traits, automated, road)
     if road is not None:
-        ways = (("mainline", road.mainline), ("ramp", road.ramp))
-        routes = [f'  <route id="{name}" edges="{" ".join(way.edges)}"/>' for name, way in ways]
-        return route_file(list(types.values()), routes, vehicles)
+        return route_file(list(types.values()), _routes(road), vehicles)
     return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
 
 
@@ -158,11 +156,9 @@ def driver_lines(
             common_mps = scenario.ramp.speed_mps if arrival.on_ramp else wish_mps
             entry_mps = min(arrival.speed_mps, common_mps * (own.speed_factor or 1.0))
             name = f"driver-{arrival.length_m!r}"
-            if road is not None:
-                limit_mps = max(road.way(False).limits.limit_mps)
-                if own.speed_factor is not None and wish_mps < limit_mps:
-                    wish_mps *= own.speed_factor / drivers.highest_factor
-                    name += f"-{arrival.vehicle_id}"
+            if road is not None and _is_cut(road, own, wish_mps):
+                wish_mps *= (own.speed_factor or 1.0) / drivers.highest_factor
+                name += f"-{arrival.vehicle_id}"
             if len(drivers.taus_s) > 1:
                 name += f"-{own.tau_s!r}"
         if arrival.traits is not None and not math.isinf(arrival.traits.top_speed_mps):
@@ -177,6 +173,16 @@ def driver_lines(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor, road)
         )
     return types, vehicles
+
+
+def _is_cut(road: Ways, own: DriverTraits, wish_mps: float) -> bool:
+    """Whether v0 is below the limit, of which SUMO's factor is: each has a top speed instead."""
+    return own.speed_factor is not None and wish_mps < max(road.mainline.limits.limit_mps)
+
+
+def _routes(road: LanedRoad) -> list[str]:
+    ways = (("mainline", road.mainline), ("ramp", road.ramp))
+    return [f'  <route id="{name}" edges="{" ".join(way.edges)}"/>' for name, way in ways]
 
 
 def automated_cruise_mps(scenario: Scenario, arrival: Arrival) -> float:

@@ -211,7 +211,8 @@ class RunFiles:
         written = pl.read_parquet(self._folder / "fcd.parquet")
         if "vehicle_id" not in written.columns:  # nobody ever drove
             nothing = np.empty(0)
-            return Samples(*[nothing.astype(np.int64)] * 2, *[nothing] * 3)
+            nobody = nothing.astype(np.int64)
+            return Samples(nobody, nobody, nothing, nothing, nothing)
         frame = (
             written.lazy()
             .drop_nulls("vehicle_id")

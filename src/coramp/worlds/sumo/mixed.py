@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,9 +81,10 @@ def begun(
     )
     files.write_additional()
     with Session(files.options(), step_s, options.gui, options.tell) as session:
-        plant = plant_on(
-            plan,
+        plant_kind, control_kind = _kinds_on(laned)
+        plant = plant_kind(
             session,
+            plan.lane_starts_m() if isinstance(plan, RoadPlan) else {},
             Able.of(scenario, arrivals, automated),
             period_steps,
             step_s,
@@ -94,29 +95,19 @@ def begun(
         laws = laws_of(scenario, drivers, plant.period_s, actuators.delay_s)
         air = Air(scenario, heard, automated, seed)
         acts_after_s = scenario.commands.delay_s + actuators.delay_s
-        control = control_of(
-            plant, strategy, laws, air, acts_after_s, notes=notes_of(options, air)
-        )
+        control = control_kind(strategy, laws, air, acts_after_s, notes=notes_of(options, air))
+        if laned is not None:
+            plant.is_on(laned)
+            control.drives(plant)
         careless = Careless(scenario, session, seed)
         yield MixedRun(scenario, population, arrivals, files, plant, control, careless)
 
 
-def plant_on(road: RoadPlan | LanedRoad, session: Session, *rest: Any) -> MixedPlant:
-    """Returns the vehicles of a session on a road of one lane or several."""
-    from coramp.worlds.sumo.mixed_lanes import LanedPlant
-
-    if isinstance(road, LanedRoad):
-        return LanedPlant(session, {}, *rest, road=road)
-    return MixedPlant(session, road.lane_starts_m(), *rest)
-
-
-def control_of(plant: MixedPlant, *rest: Any, notes: Notes | None) -> "Control":
-    """Returns the control of a run on a road of one lane or several."""
+def _kinds_on(laned: LanedRoad | None) -> tuple[type[MixedPlant], type["Control"]]:
+    """What carries and controls vehicles on a road of several lanes, or of one."""
     from coramp.worlds.sumo.mixed_lanes import LanedControl, LanedPlant
 
-    if isinstance(plant, LanedPlant):
-        return LanedControl(*rest, notes=notes, plant=plant)
-    return Control(*rest, notes=notes)
+    return (MixedPlant, Control) if laned is None else (LanedPlant, LanedControl)
 
 
 class Moment(NamedTuple):
@@ -219,6 +210,9 @@ class Control:
     acts_after_s: float = 0.0
     places: Places = field(default=())
     notes: Notes | None = None
+
+    def drives(self, plant: MixedPlant) -> None:
+        """Is told whom it drives, which it asks for lanes where there are several."""
 
     def decided(self, now_s: float, names: list[str], able: BoolArray, users: RoadUsers) -> Moment:
         """Returns what the strategy answers to what it has heard.

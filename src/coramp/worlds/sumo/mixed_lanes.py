@@ -36,6 +36,10 @@ class LanedPlant(MixedPlant):
     beside: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
     _sumo_lane: dict[str, int] = field(default_factory=dict)
 
+    def is_on(self, road: LanedRoad) -> None:
+        """Is told its road."""
+        self.road = road
+
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who may leave the acceleration lane, and all that is on the road."""
         assert self.road is not None
@@ -110,6 +114,11 @@ class LanedControl(Control):
 
     plant: InLanes | None = None
 
+    def drives(self, plant: MixedPlant) -> None:
+        """Is told whom it drives."""
+        assert isinstance(plant, LanedPlant)
+        self.plant = plant
+
     def decided(self, now_s: float, names: list[str], able: BoolArray, users: RoadUsers) -> Moment:
         """Returns what the strategy answers to what it has heard of the outer lanes."""
         outer = _chosen(users, self._lane <= OUTERMOST)
@@ -181,8 +190,8 @@ class LanedControl(Control):
     ) -> list[int]:
         """Which vehicles of the outermost lane change to the lane further in."""
         users, lane = moment.users, self._lane
-        held = users.automated & (lane == OUTERMOST) & (users.station_m < self.laws.safety.lane_end_m)
-        held &= self._beside & np.isfinite(most_mps2)
+        held = users.automated & (lane == OUTERMOST) & self._beside & np.isfinite(most_mps2)
+        held &= users.station_m < self.laws.safety.lane_end_m
         beside = around.rear[merging]
         held[beside[beside >= 0]] = False  # one thing at a time: its new leader comes in now
         if not (held & (most_mps2 < 0.0)).any():

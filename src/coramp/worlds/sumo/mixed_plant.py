@@ -10,6 +10,7 @@ from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import RoadUsers
 from coramp.worlds.faults.actuators import SlowActuators
+from coramp.worlds.sumo.lanes import LanedRoad
 from coramp.worlds.sumo.mixed_setup import Able
 from coramp.worlds.sumo.network import RAMP_LANES
 from coramp.worlds.sumo.session import Session
@@ -68,6 +69,9 @@ class MixedPlant:
     def period_s(self) -> float:
         """The time (s) between two commands."""
         return self.period_steps * self.step_s
+
+    def is_on(self, road: LanedRoad) -> None:
+        """Is told its road where that has several lanes."""
 
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who is on the acceleration lane, and all that is on the road."""

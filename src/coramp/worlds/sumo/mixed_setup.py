@@ -7,7 +7,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
-from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
+from coramp.mixed.laws import LANE_END_M, FollowingLaw, OnBoardLaws, SafetyLaw
 from coramp.mixed.users import Gaps, MixedRoad
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
@@ -15,8 +15,6 @@ from coramp.vehicles.traits import Traits
 from coramp.worlds.faults.actuators import SlowActuators
 from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
 
-LANE_END_M = 3.0
-"""An automated vehicle that has not merged stands so far before the acceleration lane ends."""
 MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.15
 """How much more than behind an automated vehicle one keeps behind a driver."""
 MORE_FOR_DRIVER_S = 0.25

@@ -40,7 +40,7 @@ def sumo_binary(name: str) -> str:
 
 
 class LaneSpan(NamedTuple):
-    """Where one of SUMO's lanes lies: the station at which it begins, and metres of station a metre.
+    """Where one of SUMO's lanes lies: the station at which it begins, metres of station a metre.
 
     ``lane`` is its number: that of the mainline, 0 next to the ramp, or ``RAMP_LANE``. ``changes``
     tells that a vehicle can change from it to the next lane of the mainline further in.
