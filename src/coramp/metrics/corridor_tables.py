@@ -12,6 +12,7 @@ from coramp.records.corridor_outcome import (
     MESSAGES,
     PASSAGES,
     SITES,
+    TOTALS,
     TRIPS,
     CorridorOutcome,
 )
@@ -43,7 +44,7 @@ def totals_of(outcome: CorridorOutcome, sites: pl.DataFrame) -> Row:
     )
     vehicles, through = len(outcome.vehicle_id), int((~np.isnan(trips["left_s"])).sum())
     errors_m = outcome.plan_error_m[~np.isnan(outcome.plan_error_m)]
-    return {
+    found: Row = {
         "vehicles": vehicles,
         "through": through,
         "unserved": vehicles - through,
@@ -65,6 +66,7 @@ def totals_of(outcome: CorridorOutcome, sites: pl.DataFrame) -> Row:
         "until_s": outcome.until_s,
         "most_at_once": outcome.most_at_once,
     }
+    return {name: found[name] for name in TOTALS}
 
 
 def _sum(values: FloatArray) -> float:

@@ -29,6 +29,11 @@ from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
 from coramp.worlds.sumo.files import SumoOptions
 
 MOST_PROCESSES = 64
+CONTENT = (
+    "kind", "result_version", "run_id", "scenario", "strategy", "drivers", "seed",
+    "specification", "versions", "summary", "sites", "processes", "wall_s",
+)  # fmt: skip
+"""The keys of a corridor's ``run.json``."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,7 @@ def execute_corridor(
     )
     frames = corridor_tables(outcome)
     totals = totals_of(outcome, frames["sites"])
-    content = {
+    content: Row = {
         "kind": CORRIDOR,
         "result_version": RESULT_VERSION,
         "run_id": spec.run_id,
@@ -142,7 +147,7 @@ def execute_corridor(
         "processes": processes,
         "wall_s": time.perf_counter() - started,
     }
-    return CorridorResult({key: finite_or_none(value) for key, value in content.items()}, frames)
+    return CorridorResult({key: finite_or_none(content[key]) for key in CONTENT}, frames)
 
 
 def write_corridor(folder: Path, result: CorridorResult) -> None:

@@ -57,8 +57,10 @@ class CorridorFiles(RunFiles):
     def trips(self, number: dict[str, int]) -> dict[str, FloatArray]:
         """Returns SUMO's figures of each vehicle's trip, read one by one."""
         found = {name: np.full(len(number), np.nan) for name in TRIPS}
-        for _, trip in ET.iterparse(self._folder / "tripinfo.xml"):
-            if trip.tag == "tripinfo":
+        told = ET.iterparse(self._folder / "tripinfo.xml", events=("start", "end"))
+        _, root = next(told)
+        for event, trip in told:
+            if event == "end" and trip.tag == "tripinfo":
                 k = number[trip.get("id", "")]
                 values = (
                     _time_s(trip.get("depart")),
@@ -68,7 +70,7 @@ class CorridorFiles(RunFiles):
                 )
                 for name, value in zip(TRIPS, values, strict=True):
                     found[name][k] = value
-            trip.clear()
+                root.clear()  # what is read is not kept
         return found
 
 
