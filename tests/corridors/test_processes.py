@@ -67,6 +67,7 @@ kept = []
 
 def test_a_coordinator_knows_its_zone_alone_and_what_it_is_told(tmp_path, network, monkeypatch):
     """Alone, and told the same, it answers the same: nothing else reaches it."""
+    kept.clear()
     monkeypatch.setattr("coramp.worlds.sumo.corridor_sites.SitesHere", Overheard)
     result = coramp.corridor(written(tmp_path, network, horizon_s=60.0))
     (overheard,) = kept
@@ -82,6 +83,20 @@ def test_a_coordinator_knows_its_zone_alone_and_what_it_is_told(tmp_path, networ
                 assert station_m.min() >= -300.0
                 assert np.ptp(station_m) <= lengths_m[setup.scenario.network.ramp] + 100.0
         assert any(answer.changes.any() for _, answer in heard)
+
+
+def test_a_vehicle_is_the_same_at_all_sites_and_links_are_not(tmp_path, network, monkeypatch):
+    """Who disobeys at one site disobeys at the next; what is lost at one is not lost at both."""
+    tables = {"behaviour": {"disobeys_share": 0.5}, "commands": {"loss": 0.2}}
+    kept.clear()
+    monkeypatch.setattr("coramp.worlds.sumo.corridor_sites.SitesHere", Overheard)
+    result = coramp.corridor(written(tmp_path, network, 1.0, 30.0, tables))
+    first, second = (site._air for site in kept[0]._sites)
+    np.testing.assert_array_equal(first._disobeys, second._disobeys)
+    assert 0.2 < first._disobeys.mean() < 0.8
+    lost = result.sites["commands_lost"] / result.sites["commands_sent"]
+    assert lost.to_list() == pytest.approx([0.2, 0.2], abs=0.05)
+    assert lost[0] != lost[1]
 
 
 def test_a_process_that_ends_is_told_in_one_line(tmp_path, network, monkeypatch):

@@ -153,6 +153,16 @@ def test_another_flow_of_one_ramp_shifts_no_other_arrival(tmp_path, network):
     assert len(few["on2@merge2"]) < len(many["on2@merge2"])
 
 
+def test_zones_without_an_exit_between_them_are_passed_one_after_the_other(tmp_path, without_exit):
+    """The second site's mainline begins behind the first one's acceleration lane."""
+    path = written(tmp_path, without_exit, 1.0, 60.0, exits=[], upstream_m=400.0)
+    result = coramp.corridor(path, out=tmp_path / "out", keep_sumo=True)
+    assert result.summary["unserved"] == result.summary["collisions"] == 0
+    assert gaps_m(positions(tmp_path / "out"), "vehicle_lane", "vehicle_pos").min() > 0.0
+    first, second = result.sites.to_dicts()
+    assert second["mainline_served"] == first["mainline_served"] + first["ramp_served"]
+
+
 def test_a_vehicle_that_breaks_down_stops_its_site_alone(tmp_path, network):
     """Who stands on the mainline of a zone is seen by its coordinator; nobody collides."""
     tables = {"incidents": {"breakdown_s": 40.0, "station_m": 100.0, "lasts_s": 20.0}}

@@ -168,6 +168,7 @@ class _Planned:
                 reporting,
                 scenario.commands.delay_s + delay_s,
                 self.seed + k,
+                self.seed,
             )
             for k, scenario in enumerate(self.corridor.scenarios)
         ]

@@ -176,6 +176,7 @@ class CorridorPlant(LanedPlant):
                 n = int(found.number[i])
                 if self.able.automated[n] and n not in self._held:
                     self._held[n] = (found.names[i], k)
+                    self.actuators.begin(n)
                     place = float(own.station_m[j]), float(own.lane[j])
                     self.record.hand_over(now_s, n, k, True, (*place, float(speed_mps[i])))
 

@@ -31,7 +31,8 @@ ENDS_WITHIN_S = 10.0
 class SiteSetup(NamedTuple):
     """What a site's coordinator is made of; arrays have one entry a vehicle of the whole corridor.
 
-    A command acts ``acts_after_s`` on average after it was given. ``seed`` is that of the links.
+    A command acts ``acts_after_s`` on average after it was given. ``seed`` is that of the links,
+    ``vehicles_seed`` that of vehicles' clocks and manners, which are the same at all sites.
     """
 
     scenario: Scenario
@@ -41,6 +42,7 @@ class SiteSetup(NamedTuple):
     reporting: BoolArray
     acts_after_s: float
     seed: int
+    vehicles_seed: int
 
 
 class SiteView(NamedTuple):
@@ -89,7 +91,13 @@ class SiteCoordinator:
         self._shown = _Shown(
             setup.laws.period_s, np.empty(0, np.int64), np.empty(0, np.bool_), nobody
         )
-        self._air = Air(setup.scenario, setup.reporting, setup.automated, setup.seed)
+        self._air = Air(
+            setup.scenario,
+            setup.reporting,
+            setup.automated,
+            setup.seed,
+            vehicles_seed=setup.vehicles_seed,
+        )
         self._control = LanedControl(
             cast("MixedStrategy", strategy),
             setup.laws,
