@@ -30,8 +30,9 @@ def run(folder, name, *options, out="r"):
     """Runs a scenario for a short while and returns its summary; SUMO's files are kept."""
     file = folder / f"{name}.toml"
     file = file if file.exists() else new_scenario(folder, name)
-    rest = ("--horizon", 40, "--seed", 5, "--out", folder / out, "--keep-sumo", "--json")
-    told = invoke("run", file, "--drivers", "credible", *options, *rest)
+    rest = ("--out", folder / out, "--keep-sumo", "--json")
+    short = () if "--horizon" in options else ("--horizon", 40, "--seed", 5)
+    told = invoke("run", file, "--drivers", "credible", *options, *short, *rest)
     assert told.code == 0, told.err
     return json.loads(told.out)["summary"]
 
@@ -139,3 +140,39 @@ def test_what_cannot_run_in_a_network_is_one_line(tmp_path, options, told):
     assert refused.code == 1
     assert len(refused.errors) == 1
     assert told in refused.errors[0]
+
+
+THREE = """
+[mainline]
+start_m = -600.0
+end_m = 600.0
+speed_mps = 27.78
+lanes = 3
+flow_veh_h = 5400.0
+[ramp]
+start_m = -400.0
+speed_mps = 20.0
+acceleration_lane_m = 200.0
+flow_veh_h = 900.0
+[safety]
+time_gap_s = 1.0
+standstill_gap_m = 2.0
+"""
+
+
+def test_on_a_made_road_of_three_lanes_making_way_halves_the_delay_at_least(tmp_path):
+    (tmp_path / "three.toml").write_text(THREE, "utf-8")
+    last = ("--horizon", 120, "--seed", 1)
+    drivers = run(tmp_path, "three", "--strategy", "uncontrolled", *last, out="u")
+    own = run(tmp_path, "three", "--strategy", "mixed-slots", *last, out="c")
+    assert own["collisions"] == own["automated_violations"] == own["unserved"] == 0
+    assert overlaps(tmp_path / "c") == []
+    assert own["vehicles_ramp"] == drivers["vehicles_ramp"]
+    assert own["made_way"] > 0
+
+    def outer_delay_s(row):
+        outer = row["vehicles_mainline"] / 3
+        total = outer * row["outer_lane_delay_s"] + row["vehicles_ramp"] * row["ramp_delay_s"]
+        return total / (outer + row["vehicles_ramp"])
+
+    assert outer_delay_s(own) <= 0.5 * outer_delay_s(drivers)

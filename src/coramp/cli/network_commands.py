@@ -84,7 +84,7 @@ def new_scenario(
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
-    from coramp.scenarios.new_scenario import write_new_scenario, write_new_scenario_of_osm
+    from coramp.cli.new_scenario import write_new_scenario, write_new_scenario_of_osm
 
     target = Path(f"{name}.toml")
     if target.exists():
