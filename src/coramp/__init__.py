@@ -13,9 +13,11 @@ from coramp.errors import CorampError
 
 if TYPE_CHECKING:
     from coramp.api import (
+        CorridorResult,
         PlanResult,
         RunResult,
         StudyResult,
+        corridor,
         figures,
         load,
         plan,
@@ -26,9 +28,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CorampError",
+    "CorridorResult",
     "PlanResult",
     "RunResult",
     "StudyResult",
+    "corridor",
     "figures",
     "load",
     "plan",

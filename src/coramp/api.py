@@ -20,6 +20,14 @@ from coramp.runs.beforehand import (
     seeds_without_effect,
     without_effect_on_drivers,
 )
+from coramp.runs.corridors import (
+    CorridorResult,
+    corridor_spec,
+    execute_corridor,
+    processes_checked,
+    unserved_notice,
+    write_corridor,
+)
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
 from coramp.scenarios.loading import load_scenario
@@ -42,10 +50,12 @@ if TYPE_CHECKING:
 
 
 __all__ = [
+    "CorridorResult",
     "PlanResult",
     "RunResult",
     "StudyResult",
     "as_pandas",
+    "corridor",
     "figures",
     "load",
     "outlook",
@@ -118,6 +128,41 @@ def run(
         options = SumoOptions(stage / SUMO if keep_sumo else None, gui, keep_messages)
         result = _executed(spec, options, notice)
         write_run(stage, result)
+    return result
+
+
+def corridor(
+    scenario: str,
+    strategy: str = "mixed-slots",
+    *,
+    drivers: str | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 1,
+    processes: int = 1,
+    out: str | Path | None = None,
+    keep_sumo: bool = False,
+    gui: bool = False,
+    notice: Callable[[str], None] | None = None,
+) -> CorridorResult:
+    """Runs a corridor once, each site with a coordinator of its own; writes to ``out`` if given.
+
+    ``scenario`` is a file with ``[corridor]``. Coordinators run in this process, or in so many
+    ``processes`` of their own; the figures are the same. ``notice`` is told who is unserved.
+    Raises CorampError for what cannot be run and for a run that fails.
+    """
+    processes_checked(processes)
+    spec = corridor_spec(scenario, strategy, drivers=drivers, overrides=overrides, seed=seed)
+    if out is None and keep_sumo:
+        raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
+    if out is None:
+        result = execute_corridor(spec, processes, SumoOptions(gui=gui))
+    else:
+        with staged_folder(Path(out), not_replaceable) as stage:
+            options = SumoOptions(stage / SUMO if keep_sumo else None, gui)
+            result = execute_corridor(spec, processes, options)
+            write_corridor(stage, result)
+    if notice is not None:
+        unserved_notice(result, notice)
     return result
 
 

@@ -17,7 +17,10 @@ from coramp.messages import kinds
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
 from coramp.records import schemas
+from coramp.records.corridor_outcome import CORRIDOR_FILES, TOTALS
+from coramp.runs.corridors import CONTENT
 from coramp.runs.running import make_spec, run_content
+from coramp.scenarios.corridor_section import CorridorSection
 from coramp.scenarios.defaults import DERIVED
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
@@ -67,9 +70,15 @@ FILES = {
     **{f"{name}.csv": columns for name, columns in AGENCY.items()},
     "coramp compare --json": FIGURES,
     "detectors.csv": counts.SCHEMA,
+    **{f"{name}.parquet": schema for name, schema in CORRIDOR_FILES.items()},
 }
 RAMPS = "coramp ramps --json"
-MODELS = {"Scenario keys": Scenario, "Study keys": Study, "Snapshot keys": Snapshot}
+MODELS = {
+    "Scenario keys": Scenario,
+    "Corridor keys": CorridorSection,
+    "Study keys": Study,
+    "Snapshot keys": Snapshot,
+}
 
 
 def sections():
@@ -173,6 +182,11 @@ def test_every_parameter_of_a_strategy_stands_there_as_it_is():
 
 def test_every_key_of_run_json_stands_there():
     assert sorted(names("run.json")) == sorted(run_content(make_spec("paper"), {}))
+
+
+def test_every_key_of_a_corridors_run_stands_there_in_order():
+    assert names("run.json of a corridor") == list(CONTENT)
+    assert names("Totals of a corridor") == list(TOTALS)
 
 
 def test_every_key_of_an_on_ramp_stands_there_in_order():

@@ -62,13 +62,17 @@ def ramps(
     epilog="Example: coramp new-scenario a10 --net osm.net.xml --ramp 24498409@4054057\n\n"
     "Example: coramp new-scenario a10 --osm a10.osm.xml --ramp 24498409@4054057\n\n"
     "Example: coramp new-scenario morning --counts morning.csv --mainline-detector M "
-    "--ramp-detector R --detector M=-350 --detector R=-300",
+    "--ramp-detector R --detector M=-350 --detector R=-300"
+    "\n\nExample: coramp new-scenario road --net road.net.xml --ramp on1@m1 --ramp on2@m2",
 )
 def new_scenario(
     name: Annotated[str, typer.Argument(help="The scenario's name; NAME.toml is written.")],
     ramp: Annotated[
-        str | None,
-        typer.Option(metavar="ID", help="The on-ramp, as coramp ramps has it (default: the one)."),
+        list[str] | None,
+        typer.Option(
+            metavar="ID",
+            help="The on-ramp, as coramp ramps has it (default: the one); several are a corridor.",
+        ),
     ] = None,
     net: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A SUMO network, .net.xml or .net.xml.gz.")
@@ -110,7 +114,7 @@ def new_scenario(
         bool, typer.Option(help="Mend what does not add up in --counts, and list it.")
     ] = False,
 ) -> None:
-    """Write a scenario of an on-ramp in a SUMO network, or with demand as counted, or both.
+    """Write a scenario of on-ramps in a network, of counts, or of both.
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """
@@ -120,7 +124,7 @@ def new_scenario(
     if target.exists():
         raise CorampError(f"{target}: is there already; give another name, or move it away")
     asked = Asked(
-        *(ramp, net, osm, road, counts, mainline_detector, ramp_detector),
+        *(ramp or [], net, osm, road, counts, mainline_detector, ramp_detector),
         *(detector or [], classes or [], repair),
     )
     for line in write_asked(asked, target):

@@ -25,7 +25,7 @@ ROAD = "paper"
 class Asked(NamedTuple):
     """The options of the command; None where one is left out."""
 
-    ramp: str | None
+    ramp: list[str]
     net: Path | None
     osm: Path | None
     road: str | None
@@ -68,8 +68,10 @@ def _check_road(asked: Asked) -> None:
     in_network = asked.net is not None or asked.osm is not None
     if not in_network and asked.counts is None:
         raise CorampError("--net, --osm: allowed is one of them, or --counts alone; none is given")
-    if not in_network and asked.ramp is not None:
+    if not in_network and asked.ramp:
         raise CorampError("--ramp: is an on-ramp of a network; allowed with --net or --osm")
+    if len(asked.ramp) > 1 and asked.counts is not None:
+        raise CorampError("--counts: beside several --ramp; allowed is one on-ramp")
     if in_network and asked.road is not None:
         raise CorampError("--road: beside a network; allowed is one of them")
 

@@ -43,7 +43,8 @@ def plan(
 
 
 @computing.command(
-    epilog="Example: coramp run paper -s ramp-priority --mainline 1800 --ramp 500 --out out/r"
+    epilog="Example: coramp run paper -s ramp-priority --mainline 1800 --ramp 500 --out out/r\n\n"
+    "Example: coramp run corridor.toml -s mixed-slots --processes 2 --out out/c"
 )
 def run(
     scenario: ScenarioName,
@@ -72,11 +73,47 @@ def run(
         ),
     ] = False,
     gui: Annotated[bool, typer.Option(help="Watch in sumo-gui.")] = False,
+    processes: Annotated[
+        int | None,
+        typer.Option(help="Processes of a corridor's coordinators (default: this one alone)."),
+    ] = None,
     json: Json = False,
     wide: Wide = False,
     kmh: Kmh = False,
 ) -> None:
-    """Run a scenario once."""
+    """Run a scenario once: a merge site, or a corridor of several."""
+    from coramp.scenarios.corridors import is_corridor
+
+    if is_corridor(scenario):
+        from coramp.cli.corridor_console import run_corridor_command
+
+        given = {
+            "--mainline": mainline,
+            "--ramp": ramp,
+            "--keep-messages": keep_messages or None,
+            "--engine": None if engine == "sumo" else engine,
+        }
+        found = run_corridor_command(
+            scenario,
+            strategy,
+            refused=[option for option, value in given.items() if value is not None],
+            drivers=drivers,
+            settings=settings or [],
+            seed=seed,
+            horizon_s=horizon,
+            processes=processes,
+            out=out,
+            keep_sumo=keep_sumo,
+            gui=gui,
+            json=json,
+            wide=wide,
+        )
+        _exit_if_broken(found.broken_promises)
+        return
+    if processes is not None:
+        raise CorampError(
+            f"--processes: {scenario} has one merge site; allowed is a scenario with [corridor]"
+        )
     from coramp.api import run as run_scenario
     from coramp.cli.console import (
         print_json,

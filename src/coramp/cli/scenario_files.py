@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from coramp.scenarios.demand_flows import with_demand_flows
 from coramp.scenarios.measured import COUNTS, with_counts
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.network_section import sha256_of
+from coramp.scenarios.new_corridor import new_corridor_text
 from coramp.scenarios.of_ramp import reason_against, scenario_data
 from coramp.scenarios.toml_files import validated
 
@@ -85,19 +86,32 @@ def new_scenario_text(data: Mapping[str, Any], target: Path) -> str:
     return f"{comments}{tomli_w.dumps({key: data[key] for key in keys})}"
 
 
+def _text(
+    target: Path, network: Path, lies_in: Path, ramp_ids: Sequence[str], changed: Changed
+) -> str:
+    """The text of a scenario of an on-ramp, the only one where no id is given; or of a corridor."""
+    if len(ramp_ids) < 2:
+        ramp_id = ramp_ids[0] if ramp_ids else None
+        data = new_scenario_data(network, lies_in, ramp_id, target.parent)
+        return new_scenario_text(changed(data), target)
+    place = path_from(lies_in, target.parent)
+    flows_veh_h = MODERATE_LANE_VEH_H, MODERATE_RAMP_VEH_H
+    return new_corridor_text(target.stem, network, place, ramp_ids, flows_veh_h)
+
+
 def write_new_scenario(
-    target: Path, network: Path, ramp_id: str | None, changed: Changed = dict
+    target: Path, network: Path, ramp_ids: Sequence[str], changed: Changed = dict
 ) -> None:
     """Writes the scenario of an on-ramp of a network, the only one where no id is given.
 
-    ``changed`` may give it another demand.
+    Several ids, in the order of driving, are a corridor. ``changed`` may give a single one another
+    demand.
     """
-    data = new_scenario_data(network, network, ramp_id, target.parent)
-    write_text(target, new_scenario_text(changed(data), target))
+    write_text(target, _text(target, network, network, ramp_ids, changed))
 
 
 def write_new_scenario_of_osm(
-    target: Path, osm: Path, ramp_id: str | None, changed: Changed = dict
+    target: Path, osm: Path, ramp_ids: Sequence[str], changed: Changed = dict
 ) -> None:
     """Writes a scenario, and beside it the network that netconvert makes of an OSM file.
 
@@ -113,8 +127,7 @@ def write_new_scenario_of_osm(
     with tempfile.TemporaryDirectory(prefix="coramp-osm-") as folder:
         built = Path(folder) / network.name
         _convert([*command, str(built)], osm, built)
-        data = new_scenario_data(built, network, ramp_id, target.parent)
-        text = new_scenario_text(changed(data), target)
+        text = _text(target, built, network, ramp_ids, changed)
         shutil.move(built, network)
     told = target.with_name(f"{target.stem}.netconvert.txt")
     write_text(told, " ".join([*command, str(network)]) + "\n")

@@ -71,7 +71,7 @@ def _followed(
             return LANE_GAIN, None
         if not ways or _joins(ways, through):
             return ACCELERATION_LANE, length_m
-        if all(way.to_edge != _onward(network, through) for way in ways):
+        if all(way.to_edge != onward_edge(network, through) for way in ways):
             return WEAVING_LANE, length_m
         if k + 1 < len(downstream.edges):
             length_m += ways[0].length_m
@@ -80,8 +80,8 @@ def _followed(
     return LANE_GAIN, None
 
 
-def _onward(network: Network, through: Sequence[Connection]) -> str:
-    """The edge by which the mainline goes on: that of most lanes, and rather a road than a link."""
+def onward_edge(network: Network, through: Sequence[Connection]) -> str:
+    """Returns by which edge a road goes on: that of most lanes, and rather a road than a link."""
     ways = Counter(way.to_edge for way in through)
 
     def rank(name: str) -> tuple[int, bool, int, int]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
+from coramp.records.corridor_outcome import CORRIDOR_FILES
 from coramp.records.files import read_json, write_json, write_parquet
 from coramp.records.run import MESSAGES, TABLES, RunRecords
 from coramp.records.schemas import RESULT_VERSION, Row
@@ -13,6 +14,8 @@ from coramp.records.stored_checks import SCHEMAS, checked_content, checked_frame
 from coramp.records.unfinished import is_unfinished
 
 MARK = "run.json"
+CORRIDOR = "corridor"
+"""The kind of a corridor's run in ``run.json``."""
 REPORT, REPLAY = "report.html", "replay.html"
 SUMO = "sumo"
 """The folder of SUMO's own files in that of a run."""
@@ -26,7 +29,12 @@ SUMO_FILES = (
     *(SUMO_DETECTORS, SUMO_DETECTED, DETECTED),
 )
 """What it may hold."""
-OURS = frozenset({MARK, REPORT, REPLAY, *(f"{name}.parquet" for name in (*TABLES, MESSAGES))})
+OURS = frozenset(
+    {
+        *(MARK, REPORT, REPLAY),
+        *(f"{name}.parquet" for name in (*TABLES, MESSAGES, *CORRIDOR_FILES)),
+    }
+)
 NAMED_AT_MOST = 3
 """So many foreign files are named in an error."""
 
@@ -64,7 +72,8 @@ def _describes_a_run(mark: Path) -> bool:
     except CorampError:
         return False
     needed = {"run_id", "specification", "summary"}
-    return isinstance(content, dict) and content.get("kind") == "run" and needed <= content.keys()
+    kinds = ("run", CORRIDOR)
+    return isinstance(content, dict) and content.get("kind") in kinds and needed <= content.keys()
 
 
 def _is_ours(entry: Path) -> bool:
@@ -88,6 +97,11 @@ def read_run(folder: Path) -> RunRecords:
             f"{folder}: holds no run; give a folder that coramp run --out has written"
         )
     content = read_json(folder / MARK)
+    if isinstance(content, dict) and content.get("kind") == CORRIDOR:
+        raise CorampError(
+            f"{folder}: holds the run of a corridor; this reads runs of one merge site; allowed is "
+            "its tables, such as sites.parquet"
+        )
     if not isinstance(content, dict) or content.get("kind") != "run" or "summary" not in content:
         raise CorampError(f"{folder / MARK}: does not describe a run; run again to write it anew")
     check_version(folder, content)

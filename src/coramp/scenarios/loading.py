@@ -29,6 +29,11 @@ def load_scenario(
     thing that is wrong.
     """
     label, data = read("scenarios", name)
+    if "corridor" in data:
+        raise CorampError(
+            f"{label}: [corridor]: has several merge sites, and this is for one; allowed is "
+            "coramp run, or coramp.corridor in Python"
+        )
     data = with_path(data, label)
     data, in_kmh = data_in_mps(data, label)
     overrides = overrides or {}

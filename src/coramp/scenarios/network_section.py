@@ -52,6 +52,14 @@ def sha256_of(path: Path) -> str:
         ) from error
 
 
+def changed_line(path: Path, found: str) -> str:
+    """Returns what to tell where a network is not that of its scenario's hash."""
+    return (
+        f"{path} has changed: it is {found} now; allowed is the file of that hash, or a new "
+        "scenario by coramp new-scenario"
+    )
+
+
 def site_of(section: NetworkSection) -> OnRamp:
     """Returns the merge site that a section names.
 
@@ -60,10 +68,7 @@ def site_of(section: NetworkSection) -> OnRamp:
     path = Path(section.file)
     found = sha256_of(path)
     if found != section.sha256:
-        raise CorampError(
-            f"network.sha256: {path} has changed: it is {found} now; allowed is the file of that "
-            "hash, or a new scenario by coramp new-scenario"
-        )
+        raise CorampError(f"network.sha256: {changed_line(path, found)}")
     return _site(path, found, section.ramp)
 
 

@@ -52,6 +52,11 @@ class SlowActuators:
             return 0.0
         return self.step_s / math.expm1(min(self.step_s / self.section.lag_s, LARGEST_EXPONENT))
 
+    def begin(self, number: int) -> None:
+        """Forgets what a vehicle was commanded before it was left to others: now it cruises."""
+        self._accel_mps2[number] = 0.0
+        self._queue[:, number] = 0.0
+
     def driven(self, number: IntArray, command_mps2: FloatArray) -> FloatArray:
         """Returns the acceleration (m/s2) of these vehicles in the next step."""
         due = command_mps2

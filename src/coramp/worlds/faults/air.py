@@ -33,6 +33,8 @@ class Air:
     """Both links of a run. ``reporting`` is which arrivals tell where they are.
 
     ``is_perfect`` is whether everything arrives at once and is right.
+    ``vehicles_seed`` is that of what vehicles are, their clocks and manners, where several
+    coordinators with links of their own know the same vehicles; else it is ``seed``.
     """
 
     scenario: Scenario
@@ -40,6 +42,7 @@ class Air:
     automated: BoolArray
     seed: int
     fallbacks: int = 0
+    vehicles_seed: int | None = None
     is_perfect: bool = field(init=False)
     _all_report: bool = field(init=False)
     _reports: LossyLink = field(init=False)
@@ -64,7 +67,7 @@ class Air:
         self._commands = LossyLink(scenario.commands, count, self._random_of("commands"))
         positioning = self._random_of("positioning")
         self._positions = WrongPositions(scenario.positioning, count, positioning)
-        self._clocks = WrongClocks(scenario.clock, count, self._random_of("clock"))
+        self._clocks = WrongClocks(scenario.clock, count, self._of_vehicles("clock"))
         self._known, self._command = np.full((count, 6), np.nan), np.full((count, 4), np.nan)
         self._reported_s, self._overdue = np.full(count, -np.inf), np.zeros(count, np.bool_)
         self._draw_characters(count)
@@ -72,10 +75,14 @@ class Air:
     def _random_of(self, table: str) -> Callable[[str], np.random.Generator]:
         return partial(_random_of, self.seed, table)
 
+    def _of_vehicles(self, table: str) -> Callable[[str], np.random.Generator]:
+        seed = self.seed if self.vehicles_seed is None else self.vehicles_seed
+        return partial(_random_of, seed, table)
+
     def _draw_characters(self, count: int) -> None:
         """Who falls silent when, who lies, who disobeys: automated vehicles alone."""
         behaviour, horizon_s = self.scenario.behaviour, self.scenario.simulation.horizon_s
-        random_of = self._random_of("behaviour")
+        random_of = self._of_vehicles("behaviour")
         (silent, since), lies, disobeys = (
             random_of("silent").random((2, count)),
             random_of("lies").random(count),

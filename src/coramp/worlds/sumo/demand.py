@@ -1,15 +1,16 @@
 """Arrivals as a SUMO route file: an explicit list with exact times."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from coramp._kernel import BoolArray
 from coramp.coordination.plant import Arrival
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation, Vehicle
 from coramp.vehicles.traits import CAR
-from coramp.worlds.sumo.lanes import LanedRoad
+from coramp.worlds.sumo.lanes import LanedRoad, Way
 from coramp.worlds.sumo.traits import DriverTraits
 
 KRAUSS = 'sigma="0"'
@@ -39,6 +40,21 @@ class Automated:
     manners: str
     model: str = KRAUSS
 
+
+class OriginWays(NamedTuple):
+    """The ways on which vehicles of an origin come, and the route of each by its id."""
+
+    mainline: Way
+    ramp: Way
+    route_of: Mapping[str, str]
+
+    def way(self, on_ramp: bool) -> Way:
+        """Returns the way of a stream."""
+        return self.ramp if on_ramp else self.mainline
+
+
+Ways = LanedRoad | OriginWays
+"""Where vehicles enter a network."""
 
 ROUTES = """  <route id="mainline" edges="mainline merge downstream"/>
   <route id="ramp" edges="{ramp} merge downstream"/>"""
@@ -98,13 +114,30 @@ def driver_routes(
 
     Who is ``automated`` has a type of its own. On a ``road`` of several lanes each enters on its
     own, no faster than the limits there let it.
+    """
+    types, vehicles = driver_lines(scenario, drivers, arrivals, traits, automated, road)
+    if road is not None:
+        return route_file(list(types.values()), _routes(road), vehicles)
+    return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
+
+
+def driver_lines(
+    scenario: Scenario,
+    drivers: DriverPopulation,
+    arrivals: Sequence[Arrival],
+    traits: Sequence[DriverTraits],
+    automated: Automated | None = None,
+    road: Ways | None = None,
+) -> tuple[dict[str, str], list[str]]:
+    """Returns the types of a route file by their names, and its vehicles in order of arrivals.
 
     Drivers who wish their entry speed get a type of their own each, by ``maxSpeed``. Drivers who
     wish free flow take v_R0 from the ramp's limit, and v0 from ``maxSpeed`` or, with a speed
     factor, from the mainline's limit: a ``maxSpeed`` of v0 would cut off every factor above 1.
     SUMO lets nobody enter faster than he wishes, so their entry speed is capped at that.
     """
-    types, vehicles = {}, []
+    types: dict[str, str] = {}
+    vehicles: list[str] = []
     for k, (arrival, own) in enumerate(zip(arrivals, traits, strict=True)):
         if automated is not None and automated.vehicles[k]:
             name, line = _automated_type(scenario, arrival, automated)
@@ -139,12 +172,10 @@ def driver_routes(
         vehicles.append(
             _vehicle(arrival, name, entry_mps, scenario.control.step_s, own.speed_factor, road)
         )
-    if road is not None:
-        return _text(list(types.values()), _routes(road), vehicles)
-    return _file(list(types.values()), vehicles, "ramp gore" if metered else "ramp")
+    return types, vehicles
 
 
-def _is_cut(road: LanedRoad, own: DriverTraits, wish_mps: float) -> bool:
+def _is_cut(road: Ways, own: DriverTraits, wish_mps: float) -> bool:
     """Whether v0 is below the limit, of which SUMO's factor is: each has a top speed instead."""
     return own.speed_factor is not None and wish_mps < max(road.mainline.limits.limit_mps)
 
@@ -253,9 +284,11 @@ def _vehicle(
     speed_mps: float,
     step_s: float,
     speed_factor: float | None = None,
-    road: LanedRoad | None = None,
+    road: Ways | None = None,
 ) -> str:
     route = "ramp" if arrival.on_ramp else "mainline"
+    if isinstance(road, OriginWays):
+        route = road.route_of[arrival.vehicle_id]
     lane = ""
     factor = "" if speed_factor is None else f' speedFactor="{speed_factor!r}"'
     if road is not None:
@@ -271,8 +304,9 @@ def _vehicle(
 
 
 def _file(types: Sequence[str], vehicles: Sequence[str], ramp: str = "ramp") -> str:
-    return _text(types, [ROUTES.format(ramp=ramp)], vehicles)
+    return route_file(types, [ROUTES.format(ramp=ramp)], vehicles)
 
 
-def _text(types: Sequence[str], routes: Sequence[str], vehicles: Sequence[str]) -> str:
+def route_file(types: Sequence[str], routes: Sequence[str], vehicles: Sequence[str]) -> str:
+    """Returns a route file of these lines; vehicles are to stand in the order of departure."""
     return "\n".join(["<routes>", *types, *routes, *vehicles, "</routes>", ""])

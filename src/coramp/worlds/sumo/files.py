@@ -2,9 +2,10 @@
 
 import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import polars as pl
@@ -23,8 +24,7 @@ from coramp.records.run_folder import (
 )
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.detectors import Loop, counted, loops_file, loops_of
-from coramp.worlds.sumo.lanes import LanedRoad
-from coramp.worlds.sumo.network import RAMP_LANE, RoadPlan
+from coramp.worlds.sumo.network import RAMP_LANE, LaneSpan
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
@@ -70,6 +70,29 @@ class SumoOptions:
     keep_heard: bool = False
 
 
+class RunRoad(Protocol):
+    """What a run's files need of its road: the network's file, SUMO's options, where lanes lie."""
+
+    @property
+    def file(self) -> Path:
+        """The network's file."""
+        ...
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """SUMO's options for this network."""
+        ...
+
+    @property
+    def additional(self) -> str | None:
+        """What SUMO is told beside the network, None without any."""
+        ...
+
+    def spans(self) -> Mapping[str, LaneSpan]:
+        """Returns where each lane lies."""
+        ...
+
+
 class RunFiles:
     """The files of one run in a folder of its own, and what is read from them."""
 
@@ -77,7 +100,7 @@ class RunFiles:
         self,
         folder: Path,
         scenario: Scenario,
-        plan: RoadPlan | LanedRoad,
+        plan: RunRoad,
         seed: int,
         options: SumoOptions,
         ballistic: bool,
@@ -109,7 +132,9 @@ class RunFiles:
 
     def write_detectors(self, arrivals: Sequence[Arrival]) -> None:
         """Writes the scenario's detectors where SUMO's files are kept; routes must be written."""
-        if self._keep_in is None or not self._scenario.detector:
+        if self._keep_in is None or not isinstance(self._plan, RoadPlan | LanedRoad):
+            return
+        if not self._scenario.detector:
             return
         routes = (self._folder / "routes.rou.xml").read_text()
         self._detectors = loops_of(self._scenario, self._plan, arrivals, routes)

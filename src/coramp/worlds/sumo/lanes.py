@@ -106,7 +106,7 @@ def laned_road(file: Path, site: OnRamp) -> LanedRoad:
         network=file,
         mainline=_way(site, on_ramp=False),
         ramp=_way(site, on_ramp=True),
-        lanes=_spans(site),
+        lanes=laned_spans(site),
         closed=_closed(site),
     )
 
@@ -119,7 +119,8 @@ def _way(site: OnRamp, on_ramp: bool) -> Way:
     return Way(edges, first, limits_along(site, on_ramp))
 
 
-def _spans(site: OnRamp) -> dict[str, LaneSpan]:
+def laned_spans(site: OnRamp) -> dict[str, LaneSpan]:
+    """Returns where each lane of a merge site lies, those inside junctions included."""
     found, stretches = {}, stations_of(site).stretches
     names = {stretch.lane_id for stretch in stretches if stretch.code == MAINLINE}
     for stretch in stretches:

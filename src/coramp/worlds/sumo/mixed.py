@@ -25,7 +25,7 @@ from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
 from coramp.worlds.sumo.lanes import LanedRoad, road_of
 from coramp.worlds.sumo.mixed_notes import Notes, notes_of
-from coramp.worlds.sumo.mixed_plant import MixedPlant
+from coramp.worlds.sumo.mixed_plant import Foresees, MixedPlant
 from coramp.worlds.sumo.mixed_setup import (
     Able,
     actuators_of,
@@ -234,7 +234,7 @@ class Control:
         known = around if then is users else None
         return Moment(now_s, names, able, users, seen, steering, known)
 
-    def driven(self, moment: Moment, plant: MixedPlant) -> Driven:
+    def driven(self, moment: Moment, plant: Foresees) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board.
 
         Only who is ``able`` to changes lanes.

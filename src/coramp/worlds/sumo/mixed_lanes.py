@@ -1,6 +1,7 @@
 """Automated vehicles among drivers on several lanes: their lanes, and how they make way."""
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from coramp.mixed.users import RoadUsers
 from coramp.networks.limits import Limits
 from coramp.worlds.sumo.lanes import LanedRoad
 from coramp.worlds.sumo.mixed import Control, Driven, Moment
-from coramp.worlds.sumo.mixed_plant import MixedPlant
+from coramp.worlds.sumo.mixed_plant import Foresees, MixedPlant
 from coramp.worlds.sumo.network import LaneSpan
 
 
@@ -95,6 +96,13 @@ def _allowed_mps(limits: Limits, station_m: FloatArray) -> FloatArray:
     return np.array([limits.allowed_mps(at_m) for at_m in station_m.tolist()], np.float64)
 
 
+class InLanes(Protocol):
+    """What a control asks of the plant on several lanes: each user's lane, and who can change."""
+
+    lane: IntArray
+    beside: BoolArray
+
+
 @dataclass
 class LanedControl(Control):
     """The strategy for the ramp and the lane beside it, and what each vehicle does on board.
@@ -104,7 +112,7 @@ class LanedControl(Control):
     vehicle that merges changes to the lane further in where that is safe.
     """
 
-    plant: LanedPlant | None = None
+    plant: InLanes | None = None
 
     def drives(self, plant: MixedPlant) -> None:
         """Is told whom it drives."""
@@ -127,7 +135,7 @@ class LanedControl(Control):
         assert self.plant is not None
         return self.plant.beside
 
-    def driven(self, moment: Moment, plant: MixedPlant) -> Driven:
+    def driven(self, moment: Moment, plant: Foresees) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board."""
         users, lane, laws = moment.users, self._lane, self.laws
         most_mps2, may_merge = self._told(moment, lane)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +21,19 @@ NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
 SMOOTHED_OVER_S = 0.5
 """Drivers' accelerations are noisy, and measured through a filter of this time constant."""
+
+
+class Foresees(Protocol):
+    """What a control asks of the plant: its period, and where vehicles will be."""
+
+    @property
+    def period_s(self) -> float:
+        """The time (s) between two commands."""
+        ...
+
+    def ahead(self, users: RoadUsers) -> Ahead:
+        """Returns where vehicles will be when a new command begins to act."""
+        ...
 
 
 @dataclass

@@ -7,7 +7,7 @@ are at step n - 1. What is commanded then governs the way from there to step n.
 import math
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -163,9 +163,13 @@ class Session:
     def release(self, vehicle_id: str) -> None:
         """Leaves a vehicle to its driver again; one that has left the road needs nothing."""
         if vehicle_id in libsumo.vehicle.getIDList():
-            libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
-            libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
-            libsumo.vehicle.setSpeed(vehicle_id, -1.0)
+            self.release_here(vehicle_id)
+
+    def release_here(self, vehicle_id: str) -> None:
+        """Leaves a vehicle that is on the road to its driver again."""
+        libsumo.vehicle.setSpeedMode(vehicle_id, DRIVERS_CARE)
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
+        libsumo.vehicle.setSpeed(vehicle_id, -1.0)
 
     def judge_gaps_by(self, vehicle_id: str, min_gap_m: float, assertive: float) -> None:
         """Sets by what SUMO judges gaps for a vehicle that would like to change lanes.
@@ -218,6 +222,24 @@ class Session:
             list(map(vehicle.getLaneID, names)),
             list(map(vehicle.getLanePosition, names)),
             list(map(vehicle.getSpeed, names)),
+        )
+
+    def on_lanes(
+        self, lanes: Iterable[str]
+    ) -> tuple[list[str], list[str], list[float], list[float]]:
+        """Returns who is on these lanes, as ``everyone`` does."""
+        names: list[str] = []
+        at: list[str] = []
+        for lane in lanes:
+            here = libsumo.lane.getLastStepVehicleIDs(lane)
+            names += here
+            at += [lane] * len(here)
+        vehicle = libsumo.vehicle
+        return (
+            names,
+            at,
+            [vehicle.getLanePosition(name) for name in names],
+            [vehicle.getSpeed(name) for name in names],
         )
 
     def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
