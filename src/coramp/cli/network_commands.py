@@ -114,7 +114,7 @@ def new_scenario(
         bool, typer.Option(help="Mend what does not add up in --counts, and list it.")
     ] = False,
 ) -> None:
-    """Write a scenario of on-ramps in a network, of counts, or of both.
+    """Write a scenario of ramps in a network, or of counts.
 
     With --osm netconvert makes NAME.net.xml first, and its command is kept beside it.
     """

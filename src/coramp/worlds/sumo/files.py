@@ -24,7 +24,8 @@ from coramp.records.run_folder import (
 )
 from coramp.scenarios.model import Scenario
 from coramp.worlds.sumo.detectors import Loop, counted, loops_file, loops_of
-from coramp.worlds.sumo.network import RAMP_LANE, LaneSpan
+from coramp.worlds.sumo.lanes import LanedRoad
+from coramp.worlds.sumo.network import RAMP_LANE, LaneSpan, RoadPlan
 
 PLAIN_OPTIONS = ("--no-step-log", "true", "--time-to-teleport", "-1", "--collision.action", "warn")
 COLLISION_OPTIONS = ("--collision.mingap-factor", "0", "--collision.check-junctions", "true")
