@@ -154,7 +154,7 @@ def test_another_flow_of_one_ramp_shifts_no_other_arrival(tmp_path, network):
 
 
 def test_who_merged_onto_an_empty_road_lets_others_in_at_the_next_site(tmp_path, network):
-    """There SUMO changed lanes by itself, for a vehicle of which it thinks that no gap is enough."""
+    """There SUMO changes lanes by itself for one for whom it is to find that no gap is enough."""
     flows = {"mainline_flow_veh_h": 100.0, "ramp_flow_veh_h": [900.0, 900.0], "exits": []}
     path = written(tmp_path, network, 1.0, 120.0, **flows)
     result = coramp.corridor(path, overrides={"simulation.drain_s": 240.0})
