@@ -153,6 +153,15 @@ def test_another_flow_of_one_ramp_shifts_no_other_arrival(tmp_path, network):
     assert len(few["on2@merge2"]) < len(many["on2@merge2"])
 
 
+def test_who_merged_onto_an_empty_road_lets_others_in_at_the_next_site(tmp_path, network):
+    """There SUMO changes lanes by itself for one for whom it is to find that no gap is enough."""
+    flows = {"mainline_flow_veh_h": 100.0, "ramp_flow_veh_h": [900.0, 900.0], "exits": []}
+    path = written(tmp_path, network, 1.0, 120.0, **flows)
+    result = coramp.corridor(path, overrides={"simulation.drain_s": 240.0})
+    assert result.summary["unserved"] == 0
+    assert result.sites["stopped_vehicles"].sum() == 0
+
+
 def test_zones_without_an_exit_between_them_are_passed_one_after_the_other(tmp_path, without_exit):
     """The second site's mainline begins behind the first one's acceleration lane."""
     path = written(tmp_path, without_exit, 1.0, 60.0, exits=[], upstream_m=400.0)

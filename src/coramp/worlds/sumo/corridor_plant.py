@@ -62,6 +62,7 @@ class CorridorPlant(LanedPlant):
     record: CorridorRecord = field(default_factory=lambda: CorridorRecord(0, 1.0))
     commands: bool = True
     _held: dict[int, tuple[str, int]] = field(default_factory=dict)
+    _from_ramp: set[int] = field(default_factory=set)
     _seen: set[int] = field(default_factory=set)
 
     @property
@@ -162,6 +163,7 @@ class CorridorPlant(LanedPlant):
                 continue
             del self._held[n]
             self._changing.discard(n)
+            self._from_ramp.discard(n)
             self._motion.sent_mps[n] = self._motion.sent_m[n] = np.nan
             if i is None:
                 self.session.release(name)  # beyond what is seen, or out of the network
@@ -177,6 +179,8 @@ class CorridorPlant(LanedPlant):
                 if self.able.automated[n] and n not in self._held:
                     self._held[n] = (found.names[i], k)
                     self.actuators.begin(n)
+                    if own.lane[j] == RAMP_LANE:
+                        self._from_ramp.add(n)
                     place = float(own.station_m[j]), float(own.lane[j])
                     self.record.hand_over(now_s, n, k, True, (*place, float(speed_mps[i])))
 
@@ -218,6 +222,20 @@ class CorridorPlant(LanedPlant):
             np.float64,
         )
 
+    def _settle(self, names: Sequence[str], users: RoadUsers) -> None:
+        """Has SUMO judge gaps as usual for who has come from the ramp onto the mainline.
+
+        Where the mainline is empty far and wide SUMO changes lanes by itself, without a command.
+        On the ramp SUMO finds no gap for a vehicle, and nobody could change in before it.
+        """
+        if not self._from_ramp:
+            return
+        for i in np.flatnonzero(users.on_mainline & users.automated).tolist():
+            if int(users.number[i]) in self._from_ramp:
+                self._from_ramp.discard(int(users.number[i]))
+                self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
+                self.session.take_over(names[i])
+
     def obey(self, zones: Sequence[ZoneUsers], answers: Sequence[SiteAnswer]) -> None:
         """Has the automated vehicles of all zones do what their coordinators answer."""
         names: list[str] = []
@@ -234,6 +252,7 @@ class CorridorPlant(LanedPlant):
             [answer.accel_mps2[zone.inside] for zone, answer in zip(zones, answers, strict=True)]
         )
         lane = np.concatenate([zone.view.lane[zone.inside] for zone in zones])
+        self._settle(names, users)
         self.record.change(users.number[changes & (lane >= OUTERMOST)].tolist())
         self.command(names, users, accel_mps2, changes)
 
