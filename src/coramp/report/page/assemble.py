@@ -27,19 +27,25 @@ SCRIPTS = (
     "replay.js",
     "page.js",
 )
+LANES_SCRIPT = "lanes.js"
+"""What pages have beside these where the mainline has several lanes."""
 REPORT_SCRIPTS = ("report.js",)
 
 
-def assembled(template: str, own: Sequence[str] = REPORT_SCRIPTS, **values: Any) -> str:
+def assembled(
+    template: str, own: Sequence[str] = REPORT_SCRIPTS, lanes: int = 1, **values: Any
+) -> str:
     """Returns a page from one of the templates, with scripts and styles in it.
 
-    ``own`` are the scripts that it has beside those of every page.
+    ``own`` are the scripts that it has beside those of every page; ``lanes`` is the most mainline
+    lanes of what it shows.
     """
+    beside = (LANES_SCRIPT,) if lanes > 1 else ()
     return rendered(
         template,
         styles=[asset(name) for name in STYLES],
         library=asset(LIBRARY),
-        scripts="\n".join(asset(name) for name in (*SCRIPTS, *own)),
+        scripts="\n".join(asset(name) for name in (*SCRIPTS, *beside, *own)),
         **values,
     )
 
