@@ -81,13 +81,11 @@ def run_time_space_figure(
         )
     diagrams[0].set_title(_title(run))
     for k, diagram in enumerate(reversed(diagrams)):
-        station = "station of the front bumper (m)"
+        ylabel = "station of the front bumper (m)"
         diagram.set(
             xlim=(from_s, until_s),
             ylim=(_start_m(run), run.scenario.mainline.end_m),
-            ylabel="station of the front bumper (m)"
-            if lanes == 1
-            else f"{lane_title(k)}\nstation (m)",
+            ylabel=ylabel if lanes == 1 else f"{lane_title(k)}\nstation (m)",
         )
     axes.set_xlabel("time (s)")
     grid(*diagrams)

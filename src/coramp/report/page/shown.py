@@ -14,6 +14,7 @@ from coramp.records.schemas import Row
 from coramp.records.world_told import HAPPENED
 from coramp.report.page.heard_shown import heard_data
 from coramp.report.page.lanes_shown import lanes_data
+from coramp.report.page.network_shown import shapes_data
 from coramp.report.style import look_of
 from coramp.runs.running import UNCONTROLLED
 from coramp.scenarios.model import Scenario
@@ -99,6 +100,7 @@ def road_data(scenario: Scenario) -> Row:
     lanes = scenario.mainline.lanes
     return {
         **({"lanes": lanes} if lanes > 1 else {}),
+        **({} if scenario.network is None else {"shapes": shapes_data(scenario)}),
         "start_m": scenario.mainline.start_m,
         "end_m": scenario.mainline.end_m,
         "ramp_start_m": scenario.ramp.start_m,
