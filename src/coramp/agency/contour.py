@@ -1,4 +1,8 @@
-"""Flow, density and speed over time and road, in cells of 30 s and 50 m."""
+"""Flow, density and speed over time and road, in cells of 30 s and 50 m.
+
+Where the mainline has several lanes, ``mainline`` is all of them together, and ``mainline 1`` (next
+to the ramp), ``mainline 2`` and so on are each one of them.
+"""
 
 import math
 from typing import NamedTuple
@@ -6,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from coramp._kernel import FloatArray
+from coramp._kernel import BoolArray, FloatArray
 from coramp.agency.edie import Spent, ratio, spent_in_cells
 from coramp.agency.motion import Motion
 from coramp.agency.schemas import CONTOUR
@@ -20,26 +24,47 @@ ROADS = (MAINLINE_ROAD, RAMP_ROAD)
 
 
 class Road(NamedTuple):
-    """A road from station to station (m), its lanes, and the speed (m/s) of free flow."""
+    """A road from station to station (m), its lanes, and the speed (m/s) of free flow.
+
+    ``lane`` is set where it is one of several lanes of the mainline alone, 0 next to the ramp.
+    """
 
     name: str
     start_m: float
     end_m: float
     lanes: int
     free_mps: float
+    lane: int | None = None
 
     @property
     def is_mainline(self) -> bool:
-        """Whether it is the mainline."""
-        return self.name == MAINLINE_ROAD
+        """Whether it is the mainline, or a lane of it."""
+        return self.name != RAMP_ROAD
+
+    def pieces(self, motion: Motion) -> BoolArray:
+        """Returns which pieces of a motion are on it."""
+        if self.lane is not None:
+            return motion.lane == self.lane
+        return motion.on_mainline == self.is_mainline
 
 
 def road_of(scenario: Scenario, name: str) -> Road:
-    """Returns one of the two roads of a scenario."""
+    """Returns one of the two roads of a scenario, the mainline with all of its lanes."""
     mainline, ramp = scenario.mainline, scenario.ramp
     if name == MAINLINE_ROAD:
-        return Road(name, mainline.start_m, mainline.end_m, 1, mainline.speed_mps)
+        return Road(name, mainline.start_m, mainline.end_m, mainline.lanes, mainline.speed_mps)
     return Road(name, ramp.start_m, ramp.acceleration_lane_m, 1, ramp.speed_mps)
+
+
+def lanes_of(scenario: Scenario) -> list[Road]:
+    """Returns each lane of the mainline as a road of its own; none where there is one alone."""
+    whole = road_of(scenario, MAINLINE_ROAD)
+    if whole.lanes == 1:
+        return []
+    return [
+        whole._replace(name=f"{whole.name} {lane + 1}", lanes=1, lane=lane)
+        for lane in range(whole.lanes)
+    ]
 
 
 class Cells(NamedTuple):
@@ -58,17 +83,22 @@ class Cells(NamedTuple):
 
 def cells_of(motion: Motion, name: str, cell_s: float = CELL_S, cell_m: float = CELL_M) -> Cells:
     """Returns the cells of a road; those at its end may be shorter, none is longer."""
-    road = road_of(motion.scenario, name)
+    return cells_on(motion, road_of(motion.scenario, name), cell_s, cell_m)
+
+
+def cells_on(motion: Motion, road: Road, cell_s: float = CELL_S, cell_m: float = CELL_M) -> Cells:
+    """Returns the cells of a road, or of a lane as a road of its own."""
     edges_s = np.arange(max(1, math.ceil(motion.end_s / cell_s - 1e-9)) + 1.0) * cell_s
     inner_m = np.arange(math.ceil((road.end_m - road.start_m) / cell_m - 1e-9)) * cell_m
     edges_m = np.append(road.start_m + inner_m, road.end_m).astype(np.float64)
-    on_road = motion.on_mainline == road.is_mainline
-    return Cells(road, edges_s, edges_m, spent_in_cells(motion, on_road, edges_s, edges_m))
+    spent = spent_in_cells(motion, road.pieces(motion), edges_s, edges_m)
+    return Cells(road, edges_s, edges_m, spent)
 
 
 def contour_table(motion: Motion) -> pl.DataFrame:
     """Returns one row a cell in which there were vehicles, with the columns of ``CONTOUR``."""
-    return pl.concat([_rows(cells_of(motion, name)) for name in ROADS])
+    roads = [*(road_of(motion.scenario, name) for name in ROADS), *lanes_of(motion.scenario)]
+    return pl.concat([_rows(cells_on(motion, road)) for road in roads])
 
 
 def _rows(cells: Cells) -> pl.DataFrame:

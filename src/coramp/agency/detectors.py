@@ -1,7 +1,7 @@
 """Virtual loops on the road: what induction loops of SUMO would have counted, from trajectories.
 
-Each loop is a point of one lane. A vehicle counts when its front passes, and has passed when its
-rear does; meanwhile it occupies the loop.
+Each loop is a point of one lane; a mainline of several lanes has one on each. A vehicle counts when
+its front passes, and has passed when its rear does; meanwhile it occupies the loop.
 """
 
 from typing import NamedTuple
@@ -13,12 +13,15 @@ from coramp._kernel import BoolArray, FloatArray
 from coramp.agency.edie import overlap_s, ratio
 from coramp.agency.intervals import edges_of
 from coramp.agency.level_of_service import is_heavy
-from coramp.agency.motion import Motion, passings
+from coramp.agency.motion import Motion, Passings, passings
 from coramp.agency.schemas import DETECTORS
 from coramp.metrics.frames import frame_of
 from coramp.metrics.queues import INTERVAL_S, loop_station_m
+from coramp.networks.stations import Place, stations_of
+from coramp.road.lanes import MAINLINE, RAMP
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import LENGTH
+from coramp.worlds.sumo.lanes import site_of_road
 from coramp.worlds.sumo.network import RAMP_LANES, road_plan
 
 FROM_START_M, FROM_END_M = 10.0, 30.0
@@ -28,22 +31,29 @@ FROM_START_M, FROM_END_M = 10.0, 30.0
 class Detector(NamedTuple):
     """A loop: a place on the mainline, or on the ramp with its acceleration lane.
 
-    ``lane`` and ``position_m`` say the same of SUMO's network. ``kind`` is what routers call it:
+    ``number`` is the lane of the mainline, 0 next to the ramp, None on the ramp. ``lane`` and
+    ``position_m`` say the same of SUMO's network. ``kind`` is what routers call it:
     source, between or sink; none where some vehicles pass beside it, on the acceleration lane.
     """
 
     name: str
-    on_mainline: bool
+    number: int | None
     station_m: float
     lane: str
     position_m: float
     kind: str
 
+    @property
+    def on_mainline(self) -> bool:
+        """Whether it is on the mainline."""
+        return self.number is not None
+
 
 def detectors_of(scenario: Scenario) -> list[Detector]:
     """Returns the loops: where both streams enter, upstream, beside the acceleration lane, behind.
 
-    The one upstream is where breakdowns are told, the one at the merge where ramps are metered.
+    The one upstream is where breakdowns are told, the one at the merge where ramps are metered. Of
+    several lanes each has its own, named by its number, 1 next to the ramp.
     """
     mainline, ramp = scenario.mainline, scenario.ramp
     places = (
@@ -53,15 +63,22 @@ def detectors_of(scenario: Scenario) -> list[Detector]:
         ("mainline_merge", True, scenario.detector_station_m, ""),
         ("mainline_out", True, mainline.end_m - FROM_END_M, "sink"),
     )
-    return [
-        Detector(name, on_mainline, station_m, *_lane_at(scenario, on_mainline, station_m), kind)
-        for name, on_mainline, station_m, kind in places
-    ]
+    many, found = mainline.lanes > 1, []
+    for name, on_mainline, station_m, kind in places:
+        for number in range(mainline.lanes) if on_mainline else (None,):
+            own = f"{name}_{number + 1}" if many and number is not None else name
+            lane, position_m = _lane_at(scenario, number, station_m)
+            found.append(Detector(own, number, station_m, lane, position_m, kind))
+    return found
 
 
-def _lane_at(scenario: Scenario, on_mainline: bool, station_m: float) -> tuple[str, float]:
+def _lane_at(scenario: Scenario, number: int | None, station_m: float) -> tuple[str, float]:
     """The lane of SUMO's network at a station, and the position (m) on it."""
-    plan = road_plan(scenario)
+    site = site_of_road(scenario)
+    if site is not None:
+        code, lane = (RAMP, 0) if number is None else (MAINLINE, number)
+        return stations_of(site).position(Place(station_m, code, lane))
+    plan, on_mainline = road_plan(scenario), number is not None
     starts_m = plan.lane_starts_m()
     here = {
         lane: station_m - starts_m[lane]
@@ -79,7 +96,7 @@ def detectors_table(motion: Motion, interval_s: float = INTERVAL_S) -> pl.DataFr
 
 
 def _rows(motion: Motion, detector: Detector, edges_s: FloatArray) -> pl.DataFrame:
-    fronts = passings(motion, detector.on_mainline, detector.station_m)
+    fronts = _fronts(motion, detector)
     length_m = motion.traits[:, LENGTH]
     bins = len(edges_s) - 1
     place = np.clip(np.searchsorted(edges_s, fronts.time_s, "right") - 1, 0, bins - 1)
@@ -116,6 +133,10 @@ def _rows(motion: Motion, detector: Detector, edges_s: FloatArray) -> pl.DataFra
     )
 
 
+def _fronts(motion: Motion, detector: Detector) -> Passings:
+    return passings(motion, detector.on_mainline, detector.station_m, detector.number)
+
+
 def _rear_s(motion: Motion, detector: Detector) -> FloatArray:
     """When each vehicle's rear passes the loop (s), infinite where it does not.
 
@@ -126,7 +147,7 @@ def _rear_s(motion: Motion, detector: Detector) -> FloatArray:
     for on_mainline in (False, True):
         vehicle, time_s, _ = passings(motion, on_mainline, rear_m)
         found_s[vehicle] = np.minimum(found_s[vehicle], time_s)
-    fronts = passings(motion, detector.on_mainline, detector.station_m).vehicle
+    fronts = _fronts(motion, detector).vehicle
     counted = np.zeros(len(motion), np.bool_)
     counted[fronts] = True
     return np.where(counted, found_s, np.inf)

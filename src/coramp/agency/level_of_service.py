@@ -2,8 +2,9 @@
 
 Densities count passenger cars per mile and lane: a heavy vehicle stands for two (Exhibit 12-25,
 level terrain). The letters of basic segments are those of Exhibit 12-15, those of merge influence
-areas, which reach 1,500 ft (457.2 m) downstream from where the ramp joins, of Exhibit 14-3. F is
-demand above capacity: here, intervals in which the merge is broken down.
+areas, which reach 1,500 ft (457.2 m) downstream from where the ramp joins, of Exhibit 14-3. These
+have the acceleration lane and the two mainline lanes next to it (chapter 14), other segments all
+lanes. F is demand above capacity: here, intervals in which the merge is broken down.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import FloatArray
-from coramp.agency.contour import MAINLINE_ROAD, RAMP_ROAD, Road, road_of
+from coramp.agency.contour import MAINLINE_ROAD, RAMP_ROAD, Road, lanes_of, road_of
 from coramp.agency.edie import spent_in_cells
 from coramp.agency.intervals import breakdowns, edges_of
 from coramp.agency.motion import Motion
@@ -22,7 +23,7 @@ from coramp.metrics.queues import INTERVAL_S
 from coramp.scenarios.model import Scenario
 
 KM_PER_MI = 1.609344
-MERGE_INFLUENCE_M = 457.2
+MERGE_INFLUENCE_M, MERGE_INFLUENCE_LANES = 457.2, 2
 CARS_PER_TRUCK = 2.0
 BASIC_PC_MI_LN = (("A", 11.0), ("B", 18.0), ("C", 26.0), ("D", 35.0), ("E", 45.0))
 MERGE_PC_MI_LN = (("A", 10.0), ("B", 20.0), ("C", 28.0), ("D", 35.0), ("E", np.inf))
@@ -96,19 +97,20 @@ def density_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns density (passenger cars per km and lane) and mean speed (m/s) by interval.
 
-    The acceleration lane counts as a lane for as long as it is, with those who are on it. Speeds
-    are nan where nobody was.
+    The acceleration lane counts as a lane for as long as it is, with those who are on it. Of a
+    merge influence area the two mainline lanes next to it count alone. Speeds are nan where nobody
+    was.
     """
     heavy = is_heavy(motion)
     cars = np.where(heavy, CARS_PER_TRUCK, 1.0)
     lane_m, time_s, way_m = 0.0, np.zeros(len(edges_s) - 1), np.zeros(len(edges_s) - 1)
     weighted_s = np.zeros(len(edges_s) - 1)
-    for road in (road_of(motion.scenario, name) for name in (MAINLINE_ROAD, RAMP_ROAD)):
+    for road in _roads_of(motion.scenario, segment):
         edges_m = np.array([max(segment.start_m, road.start_m), min(segment.end_m, road.end_m)])
-        if edges_m[0] >= edges_m[1] or (not road.is_mainline and segment.kind != MERGE):
+        if edges_m[0] >= edges_m[1]:
             continue
         lane_m += _lane_m(road, edges_m)
-        on_road = motion.on_mainline == road.is_mainline
+        on_road = road.pieces(motion)
         spent = spent_in_cells(motion, on_road, edges_s, edges_m)
         time_s += spent.time_s[:, 0]
         way_m += spent.way_m[:, 0]
@@ -116,6 +118,15 @@ def density_of(
     speed_mps = np.full(len(time_s), np.nan)
     np.divide(way_m, time_s, out=speed_mps, where=time_s > 0.0)
     return weighted_s / (lane_m * np.diff(edges_s)) * 1000.0, speed_mps
+
+
+def _roads_of(scenario: Scenario, segment: Segment) -> list[Road]:
+    """The roads that count in a segment."""
+    mainline = road_of(scenario, MAINLINE_ROAD)
+    if segment.kind != MERGE:
+        return [mainline]
+    near = lanes_of(scenario)[:MERGE_INFLUENCE_LANES] or [mainline]
+    return [*near, road_of(scenario, RAMP_ROAD)]
 
 
 def _lane_m(road: Road, edges_m: FloatArray) -> float:

@@ -14,7 +14,7 @@ import polars as pl
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.kinematics.trajectory import ACCEL, SPEED, STATION, TIME
 from coramp.records.run import RunRecords
-from coramp.road.lanes import LANES, MAINLINE
+from coramp.road.lanes import mainline_lane
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.traits import CAR, Traits
 
@@ -28,8 +28,8 @@ class Motion:
     One entry a vehicle, in the order of ``vehicles.parquet``. ``entry_s`` and ``exit_s`` are nan
     for what never happened, ``until_s`` is when the vehicle left, or the run ended without it.
     ``traits`` are rows of ``vehicles.traits``, infinite where nothing binds. Of pieces there is one
-    entry a row of ``rows``, by vehicle and time: ``vehicle`` is whose it is, ``on_mainline`` is
-    False on the ramp and the acceleration lane.
+    entry a row of ``rows``, by vehicle and time: ``vehicle`` is whose it is, ``lane`` is that of
+    the mainline, 0 next to the ramp, or -1 on the ramp and the acceleration lane.
     """
 
     scenario: Scenario
@@ -45,11 +45,16 @@ class Motion:
     fuel_l: FloatArray
     automated: BoolArray
     vehicle: IntArray
-    on_mainline: BoolArray
+    lane: IntArray
     rows: FloatArray
 
     def __len__(self) -> int:
         return len(self.on_ramp)
+
+    @cached_property
+    def on_mainline(self) -> BoolArray:
+        """Which pieces are on the mainline, on whichever lane."""
+        return self.lane >= 0
 
     @property
     def finished(self) -> BoolArray:
@@ -112,7 +117,7 @@ def motion_of(run: RunRecords) -> Motion:
         fuel_l=_floats(vehicles, "fuel_l"),
         automated=np.array(_or_else(vehicles, "automated", run.trajectories is not None), np.bool_),
         vehicle=ordered["place"].to_numpy().astype(np.int64),
-        on_mainline=(ordered["lane"] == LANES[MAINLINE]).to_numpy(),
+        lane=np.array([mainline_lane(name) for name in ordered["lane"]], np.int64),
         rows=ordered.select(PIECE_COLUMNS).to_numpy().reshape(-1, len(PIECE_COLUMNS)),
     )
 
@@ -146,16 +151,20 @@ class Passings(NamedTuple):
     speed_mps: FloatArray
 
 
-def passings(motion: Motion, on_mainline: bool, station_m: FloatArray | float) -> Passings:
+def passings(
+    motion: Motion, on_mainline: bool, station_m: FloatArray | float, lane: int | None = None
+) -> Passings:
     """Returns the passings of a station on the mainline, or on the ramp with its acceleration lane.
 
-    ``station_m`` may differ from vehicle to vehicle. Each vehicle counts at most once a piece.
+    ``lane`` is one of the mainline's alone, 0 next to the ramp. ``station_m`` may differ from
+    vehicle to vehicle. Each vehicle counts at most once a piece.
     """
     rows = motion.rows
     here_m = np.broadcast_to(np.asarray(station_m, np.float64), len(motion))[motion.vehicle]
     next_m = np.append(rows[1:, STATION], np.inf)[: len(rows)]
     to_m = np.where(motion.is_last, rows[:, STATION] + motion.way_m, next_m)
-    passes = (rows[:, STATION] <= here_m) & (here_m < to_m) & (motion.on_mainline == on_mainline)
+    there = motion.on_mainline == on_mainline if lane is None else motion.lane == lane
+    passes = (rows[:, STATION] <= here_m) & (here_m < to_m) & there
     own, left_m = rows[passes], (here_m - rows[:, STATION])[passes]
     taken_s = time_over_s(own[:, SPEED], own[:, ACCEL], left_m)
     taken_s = np.minimum(taken_s, motion.duration_s[passes])

@@ -3,7 +3,8 @@
 A vehicle queues from when it is slower than 5 km/h until it is faster than 10 km/h. Queued vehicles
 belong together where at most 20 m lie between them. These are the usual settings of a queue counter
 (PTV Vissim). What is slow without standing is told by congestion: stretches of 50 m whose mean
-speed over 30 s is below 75 % of free flow, as for a breakdown.
+speed over 30 s is below 75 % of free flow, as for a breakdown. Several lanes of the mainline count
+together: who queues on any of them, the longest of their queues, and the mean speed of all.
 """
 
 import numpy as np
@@ -34,7 +35,12 @@ def queues_table(motion: Motion) -> pl.DataFrame:
         cells = cells_of(motion, name)
         bins = len(cells.edges_s) - 1
         own = sampled.filter(on_mainline=cells.road.is_mainline)
-        at_second = own.group_by("second").agg(pl.len(), pl.col("fills_m").sum())
+        at_second = (
+            own.group_by("second", "lane")
+            .agg(pl.len(), pl.col("fills_m").sum())
+            .group_by("second")
+            .agg(pl.col("len").sum(), pl.col("fills_m").max())
+        )
         second = at_second["second"].to_numpy()
         waiting = waiting_by_second(motion, cells.road.is_mainline)
         frames.append(
@@ -75,7 +81,7 @@ def waiting_by_second(motion: Motion, by_mainline: bool) -> IntArray:
 
 
 def queued_samples(motion: Motion) -> pl.DataFrame:
-    """Returns who queues at each whole second: vehicle, second, road, station, and road it fills.
+    """Returns who queues at each whole second: vehicle, second, lane, station, and road it fills.
 
     ``fills_m`` is the vehicle's length and, where the one ahead in its lane queues within 20 m, the
     room between the two.
@@ -93,15 +99,15 @@ def queued_samples(motion: Motion) -> pl.DataFrame:
     length_m = motion.traits[:, LENGTH]
     queued = queued.with_columns(
         length_m=pl.Series(length_m[queued["vehicle"].to_numpy()], dtype=pl.Float64)
-    ).sort("second", "on_mainline", "station_m", descending=[False, False, True])
-    ahead = (pl.col("station_m") - pl.col("length_m")).shift(1).over("second", "on_mainline")
+    ).sort("second", "lane", "station_m", descending=[False, False, True])
+    ahead = (pl.col("station_m") - pl.col("length_m")).shift(1).over("second", "lane")
     gap = (ahead - pl.col("station_m")).clip(lower_bound=0.0)
     room = pl.when(gap <= TOGETHER_M).then(gap).otherwise(0.0).fill_null(0.0)
     return queued.with_columns(fills_m=pl.col("length_m") + room)
 
 
 def samples(motion: Motion, step_s: float) -> pl.DataFrame:
-    """Returns vehicle, second, road, station (m) and speed (m/s) at all multiples of a step."""
+    """Returns vehicle, second, lane, station (m) and speed (m/s) at all multiples of a step."""
     start_s = motion.rows[:, TIME]
     low = np.ceil(start_s / step_s - 1e-9).astype(np.int64)
     high = np.ceil((start_s + motion.duration_s) / step_s - 1e-9).astype(np.int64)
@@ -115,6 +121,7 @@ def samples(motion: Motion, step_s: float) -> pl.DataFrame:
             "vehicle": motion.vehicle[piece],
             "second": second,
             "on_mainline": motion.on_mainline[piece],
+            "lane": motion.lane[piece],
             "station_m": own[:, STATION] + (own[:, SPEED] + 0.5 * own[:, ACCEL] * x) * x,
             "speed_mps": own[:, SPEED] + own[:, ACCEL] * x,
         }

@@ -15,6 +15,7 @@ from coramp.kinematics.trajectory import TIME, station_and_speed
 from coramp.records.run import RunRecords, moved_for
 from coramp.records.schemas import Row
 from coramp.report.plan_figure import COLUMNS
+from coramp.road.lanes import mainline_lane
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.merge_state import BY_MAINLINE_S, NOT_PLANNED_S, is_on_mainline
 
@@ -154,10 +155,10 @@ def driven_of(trajectories: pl.DataFrame, vehicles: pl.DataFrame) -> dict[str, D
 
 
 def _merge_s(pieces: pl.DataFrame) -> float:
-    lanes = pieces["lane"].to_list()
-    if "mainline" not in lanes:
+    on_mainline = [mainline_lane(name) >= 0 for name in pieces["lane"]]
+    if not any(on_mainline):
         return NOT_PLANNED_S
-    first = lanes.index("mainline")
+    first = on_mainline.index(True)
     return float(pieces["time_s"][first]) if first else BY_MAINLINE_S
 
 

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
+from coramp.report.lane_diagrams import LANE_IN, Line, draw_by_lane, lane_title
 from coramp.report.lapse_marks import mark_lapses
 from coramp.report.plan_figure import MAINLINE_COLOUR, MOVED_COLOUR, RAMP_COLOUR
 from coramp.report.story_scene import Driven, driven_of
@@ -27,8 +28,10 @@ def run_time_space_figure(
 
     From ``from_s`` (default: 0) until ``until_s`` (default: 120 s later). Dots are merges, those of
     drivers where they were seen on the mainline first; the gid of a line is its vehicle's id. Where
-    the world fails, fallbacks, gaps in what was known and breakdowns are marked on the lines.
-    Raises CorampError for an empty window.
+    the world fails, fallbacks, gaps in what was known and breakdowns are marked on the lines. Where
+    the mainline has several lanes there is a diagram for each, the one next to the ramp, and the
+    ramp itself, lowest: lines of those on other lanes are faint, and triangles are automated
+    vehicles that made way there. Raises CorampError for an empty window.
     """
     from_s = 0.0 if from_s is None else from_s
     until_s = from_s + WINDOW_S if until_s is None else until_s
@@ -37,16 +40,31 @@ def run_time_space_figure(
     moved = _moved(run)
     kinds = zip(run.vehicles["vehicle_id"], run.vehicles["automated"], strict=True)
     automated = dict(kinds) if run.is_mixed else {}
-    figure = new_figure(10.0, 5.6)
-    axes = figure.subplots()
+    lanes = run.scenario.mainline.lanes
+    figure = new_figure(10.0, 5.6 if lanes == 1 else 1.2 + LANE_IN * lanes)
+    diagrams = figure.subplots(lanes, 1, sharex=True, squeeze=False)[:, 0]
+    axes = diagrams[-1]
     lane_m = run.scenario.ramp.acceleration_lane_m
     axes.axhspan(0.0, lane_m, color=YELLOW, alpha=0.25, label="acceleration lane")
     driven = driven_of(run.motion, run.vehicles)
+    lines = {}
     for name, way in driven.items():
         times_s, stations_m = way.line(from_s, until_s, STEP_S)
         if len(times_s):
-            colour, label, width_pt = _look(way, name in moved, automated.get(name))
-            axes.plot(times_s, stations_m, color=colour, linewidth=width_pt, label=label, gid=name)
+            look = _look(way, name in moved, automated.get(name))
+            lines[name] = Line(times_s, stations_m, *look)
+    if lanes > 1:
+        draw_by_lane(run, diagrams, lines)
+    else:
+        for name, line in lines.items():
+            axes.plot(
+                line.times_s,
+                line.stations_m,
+                color=line.colour,
+                linewidth=line.width_pt,
+                label=line.label,
+                gid=name,
+            )
     mark_lapses(axes, run, driven, from_s, until_s)
     merges = _merges(run)
     within = merges.filter(merges["merge_time_s"].is_between(from_s, until_s))
@@ -61,15 +79,17 @@ def run_time_space_figure(
             label="merge",
             gid="merges",
         )
-    axes.set(
-        title=_title(run),
-        xlim=(from_s, until_s),
-        ylim=(_start_m(run), run.scenario.mainline.end_m),
-        xlabel="time (s)",
-        ylabel="station of the front bumper (m)",
-    )
-    grid(axes)
-    legend_below(figure, [axes], 5)
+    diagrams[0].set_title(_title(run))
+    for k, diagram in enumerate(reversed(diagrams)):
+        ylabel = "station of the front bumper (m)"
+        diagram.set(
+            xlim=(from_s, until_s),
+            ylim=(_start_m(run), run.scenario.mainline.end_m),
+            ylabel=ylabel if lanes == 1 else f"{lane_title(k)}\nstation (m)",
+        )
+    axes.set_xlabel("time (s)")
+    grid(*diagrams)
+    legend_below(figure, diagrams, 5)
     return figure
 
 

@@ -12,3 +12,11 @@ def lane_name(code: int) -> str:
     ``mainline`` is the lane next to the ramp, ``mainline 2`` the one beside it.
     """
     return LANES[code] if code <= MAINLINE else f"{LANES[MAINLINE]} {code - MAINLINE + 1}"
+
+
+def mainline_lane(name: str) -> int:
+    """Returns which lane of the mainline a name is: 0 next to the ramp; -1 where it is none."""
+    road, _, number = name.partition(" ")
+    if road != LANES[MAINLINE]:
+        return -1
+    return int(number) - 1 if number else 0

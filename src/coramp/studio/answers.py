@@ -77,6 +77,7 @@ class Answers:
         return assembled(
             "studio.html",
             ("studio.js",),
+            (studio.scenario,),
             title=f"Studio: {studio.scenario.name}",
             subtitle=studio.scenario.description,
             dials=[dial for dial in studio.dials if dial.name in DECIDING],

@@ -3,7 +3,7 @@
 import base64
 import gzip
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -12,6 +12,7 @@ import jinja2
 
 from coramp.records.run import RunRecords
 from coramp.report.page.shown import page_data
+from coramp.scenarios.model import Scenario
 
 LIBRARY = "uplot-1.6.32.min.js"
 STYLES = ("uplot-1.6.32.min.css", "page.css")
@@ -27,19 +28,30 @@ SCRIPTS = (
     "replay.js",
     "page.js",
 )
+LANES_SCRIPT, MAP_SCRIPT = "lanes.js", "map.js"
+"""What pages have beside these where the mainline has several lanes, and in a network."""
 REPORT_SCRIPTS = ("report.js",)
 
 
-def assembled(template: str, own: Sequence[str] = REPORT_SCRIPTS, **values: Any) -> str:
+def assembled(
+    template: str,
+    own: Sequence[str] = REPORT_SCRIPTS,
+    scenarios: Iterable[Scenario] = (),
+    **values: Any,
+) -> str:
     """Returns a page from one of the templates, with scripts and styles in it.
 
-    ``own`` are the scripts that it has beside those of every page.
+    ``own`` are the scripts that it has beside those of every page, ``scenarios`` those of which it
+    shows runs.
     """
+    shown = tuple(scenarios)
+    beside = [LANES_SCRIPT] if any(s.mainline.lanes > 1 for s in shown) else []
+    beside += [MAP_SCRIPT] if any(s.network is not None for s in shown) else []
     return rendered(
         template,
         styles=[asset(name) for name in STYLES],
         library=asset(LIBRARY),
-        scripts="\n".join(asset(name) for name in (*SCRIPTS, *own)),
+        scripts="\n".join(asset(name) for name in (*SCRIPTS, *beside, *own)),
         **values,
     )
 

@@ -121,6 +121,7 @@ def _frame(kind: str, runs: Sequence[RunRecords]) -> Row:
         "title": f"{kind}: {' against '.join(title_of(run) for run in runs)}",
         "subtitle": f"{first.scenario.name}, {first.flows}, seed {first.summary['seed']}, "
         f"{first.scenario.simulation.horizon_s:g} s of arrivals",
+        "scenarios": [run.scenario for run in runs],
         "runs": keys,
         "cells": [{"flow": first.flows, "runs": {key: key for key in keys}}],
     }

@@ -13,6 +13,8 @@ from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.records.world_told import HAPPENED
 from coramp.report.page.heard_shown import heard_data
+from coramp.report.page.lanes_shown import lanes_data
+from coramp.report.page.network_shown import shapes_data
 from coramp.report.style import look_of
 from coramp.runs.running import UNCONTROLLED
 from coramp.scenarios.model import Scenario
@@ -53,6 +55,7 @@ def page_data(run: RunRecords) -> Row:
     capped = any(exit_s is None for exit_s in exits_s)
     end_s = simulation.horizon_s + simulation.drain_s if capped else last_s
     return {
+        **lanes_data(run, place_of),
         "title": title_of(run),
         "strategy": run.summary["strategy"],
         "drivers": run.summary["drivers"],
@@ -94,7 +97,10 @@ def page_data(run: RunRecords) -> Row:
 def road_data(scenario: Scenario) -> Row:
     """Returns the road's shape, as it is built in SUMO; lengths in m, the angle in degrees."""
     _, (bend_m, _), _ = ramp_shape_m(road_plan(scenario))
+    lanes = scenario.mainline.lanes
     return {
+        **({"lanes": lanes} if lanes > 1 else {}),
+        **({} if scenario.network is None else {"shapes": shapes_data(scenario)}),
         "start_m": scenario.mainline.start_m,
         "end_m": scenario.mainline.end_m,
         "ramp_start_m": scenario.ramp.start_m,

@@ -102,6 +102,7 @@ def study_page(folder: Path, unit: SpeedUnit = MPS) -> str:
     ]
     return assembled(
         "study.html",
+        scenarios=[run.scenario for runs in by_flow.values() for run in runs],
         title=f"Report: study {study.name}",
         subtitle=study.description,
         asked=_asked(study, good, content, unit),

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from coramp.agency.before_after import Change, Measured, Pairs, changes
 from coramp.agency.figures import FIGURES
@@ -27,6 +28,11 @@ ONE_SEED = (
 
 NO_BREAKDOWN = "Traffic does not break down"
 SPEEDS = "Speed on the mainline ({}): vehicles drive upwards, red is slow"
+ALL_LANES = "mean of all {} lanes"
+SEVERAL_LANES = (
+    "Several mainline lanes count together: congested is where their mean speed is that low. The "
+    "density of the merge is that of its lane and the two mainline lanes next to it."
+)
 QUEUED = "Queues over time ({})"
 
 
@@ -60,11 +66,17 @@ def names_of(runs: Sequence[Measured]) -> list[str]:
 def _part(words: Iterator[str], table: Table, runs: Sequence[Measured], unit: SpeedUnit) -> Row:
     names = names_of(runs)
     seed = f"seed {runs[0].run.summary['seed']}"
+    lanes = max(measured.run.scenario.mainline.lanes for measured in runs)
+    if lanes > 1:
+        table = replace(table, notes=(*table.notes, SEVERAL_LANES))
     return {
         "words": list(words),
         "table": table,
         "pictures": [
-            picture(SPEEDS.format(seed), contour_figure(runs, names, unit)),
+            picture(
+                SPEEDS.format(f"{ALL_LANES.format(lanes)}, {seed}" if lanes > 1 else seed),
+                contour_figure(runs, names, unit),
+            ),
             picture(QUEUED.format(seed), queue_figure(runs, names)),
         ],
     }

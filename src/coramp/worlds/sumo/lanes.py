@@ -21,6 +21,7 @@ from coramp.worlds.sumo.network import (
     RoadPlan,
     driver_road_plan,
     network_file,
+    road_plan,
 )
 
 SIGNALS_OFF = ("--tls.all-off", "true")
@@ -96,8 +97,23 @@ def road_of(
 
 @cache
 def _made(plan: RoadPlan) -> LanedRoad:
-    file = network_file(plan)
-    return laned_road(file, on_ramps(read_network(file)).named(MADE_RAMP))
+    return laned_road(network_file(plan), _made_site(plan))
+
+
+@cache
+def _made_site(plan: RoadPlan) -> OnRamp:
+    return on_ramps(read_network(network_file(plan))).named(MADE_RAMP)
+
+
+def site_of_road(scenario: Scenario) -> OnRamp | None:
+    """Returns the merge site of a scenario in a network, or of a made road of several lanes.
+
+    None for coramp's own road of one lane. Raises CorampError where the network is not there or has
+    changed.
+    """
+    if scenario.network is not None:
+        return site_of(scenario.network)
+    return _made_site(road_plan(scenario)) if scenario.mainline.lanes > 1 else None
 
 
 def laned_road(file: Path, site: OnRamp) -> LanedRoad:
