@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from coramp.mixed.lanes import (
     GAIN_MPS2,
     HELD_MPS2,
-    inner_accelerations_mps2,
     making_way,
     neighbours_in_lanes,
+    on_endless_lanes,
 )
 from coramp.mixed.on_board import driven_mps2, neighbours_of
 from tests.mixed.roads import ON_BOARD, SAFETY, at_once, users_of
@@ -35,8 +35,7 @@ def chosen_among(rows, told_mps2=-1.0, laws=ON_BOARD):
     around, ahead = neighbours_in_lanes(users, lane), at_once(users)
     held = users.automated & (lane == 0)
     told = np.where(held, told_mps2, np.inf)
-    inner = inner_accelerations_mps2(users, around, ahead, laws)
-    return making_way(users, around, ahead, held, told, inner, laws).tolist()
+    return making_way(users, around, ahead, held, told, on_endless_lanes(laws)).tolist()
 
 
 @settings(max_examples=200, deadline=None)
