@@ -26,7 +26,8 @@ class LanedPlant(MixedPlant):
 
     ``lane`` is the number of each user's lane at the last look, from the outermost of the mainline
     on, or ``RAMP_LANE``; ``beside`` is who can change from it to the next one further in, and stays
-    beside that for another period. Each cruises no faster than the limits where it is, and ahead, let it.
+    beside that for another period. Each cruises no faster than the limits where it is, and ahead,
+    let it.
     """
 
     road: LanedRoad | None = None
