@@ -15,6 +15,8 @@ from coramp.mixed.lanes import (
     on_endless_lanes,
 )
 from coramp.mixed.on_board import driven_mps2, neighbours_of
+from coramp.networks.limits import Limits
+from coramp.worlds.sumo.mixed_lanes import allowed_mps
 from tests.mixed.roads import ON_BOARD, SAFETY, at_once, users_of
 
 B_MPS2 = SAFETY.braking_mps2
@@ -163,3 +165,11 @@ def test_two_do_not_change_into_one_gap_at_once():
     assert chosen_among(pair) == [0]
     apart = [*pair, (1, -20.0, 20.0, True)]
     assert chosen_among(apart) == [0, 1]
+
+
+def test_limits_of_many_stations_are_those_of_each():
+    limits = Limits((-300.0, -50.0, 0.0, 50.0), (20.0, 10.0, 12.5, 8.33))
+    stations_m = [-1e3, -300.0, -200.3, -60.0, -50.0, -1e-9, 0.0, 17.7, 49.9, 50.0, 1e6]
+    expected = [limits.allowed_mps(at_m) for at_m in stations_m]
+    assert allowed_mps(limits, np.array(stations_m)).tolist() == expected
+    assert allowed_mps(limits, np.empty(0)).tolist() == []
