@@ -6,6 +6,7 @@ AIR, LINK = "worlds/faults/air.py", "worlds/faults/link.py"
 NEWEST = "worlds/faults/newest.py"
 POSITIONS, ACTUATORS = "worlds/faults/positions.py", "worlds/faults/actuators.py"
 ON_BOARD, LAWS = "mixed/on_board.py", "mixed/laws.py"
+LANES, OF_LANES = "mixed/lanes.py", "tests/mixed/test_lanes_together.py"
 SETUP, PLANT = "worlds/sumo/mixed_setup.py", "worlds/sumo/mixed_plant.py"
 MOTION = "worlds/sumo/mixed_motion.py"
 JUDGE, MIXED_RUNS = "checker/among_drivers.py", "runs/mixed.py"
@@ -440,4 +441,57 @@ VERDICTS = (
 )
 """What the checker names."""
 
-MIXED_FAULTS = (*PROTOCOL, *PROMISES, *VERDICTS)
+MAKING_WAY = (
+    _fault(
+        "two make way into one gap",
+        LANES,
+        "            taken[gap] = True",
+        "            taken[gap] = False",
+        f"{OF_LANES}::test_who_makes_way_has_a_gap_to_itself_and_is_told_to_slow_down",
+    ),
+    _fault(
+        "who gets a new leader makes way at the same time",
+        LANES,
+        "held[around.rear[own]] = False",
+        "held[around.rear[own]] = held[around.rear[own]]",
+        f"{OF_LANES}::test_who_makes_way_has_a_gap_to_itself_and_is_told_to_slow_down",
+    ),
+    _fault(
+        "who has no lane beside it makes way",
+        LANES,
+        "== OUTERMOST) & lanes.beside",
+        "== OUTERMOST)",
+        f"{OF_LANES}::test_who_makes_way_has_a_gap_to_itself_and_is_told_to_slow_down",
+    ),
+    _fault(
+        "a driver behind is judged by what who makes way was told, not by what it does",
+        LANES,
+        "min(0.0, both_mps2[own]) * endless",
+        "min(0.0, told_mps2[own]) * endless",
+        f"{OF_LANES}::test_a_driver_behind_need_not_brake_harder_than_in_comfort",
+    ),
+    _fault(
+        "an automated vehicle behind who makes way is not asked",
+        ON_BOARD,
+        "    return _may_be_behind(users, rear, own, own, ahead, laws)\n",
+        "    return True\n",
+        f"{OF_LANES}::test_every_automated_vehicle_keeps_the_distance_that_it_needs_on_each_of_its_lanes",
+    ),
+    _fault(
+        "who is behind a lane change drives on as before",
+        ON_BOARD,
+        "        if changes[own] and rear >= 0 and users.automated[rear]:",
+        "        if changes[own] and rear >= len(users.number) and users.automated[rear]:",
+        f"{OF_LANES}::test_every_automated_vehicle_keeps_the_distance_that_it_needs_on_each_of_its_lanes",
+    ),
+    _fault(
+        "nobody gains by making way",
+        LANES,
+        "or inner_mps2[own] < told_mps2[own] + GAIN_MPS2",
+        "or inner_mps2[own] < -99.0",
+        "tests/mixed/test_lanes.py::test_nobody_makes_way_who_would_have_to_brake_as_much_further_in",
+    ),
+)
+"""Rules of making way on several lanes."""
+
+MIXED_FAULTS = (*PROTOCOL, *PROMISES, *VERDICTS, *MAKING_WAY)

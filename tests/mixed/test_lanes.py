@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from coramp.mixed.lanes import (
     GAIN_MPS2,
     HELD_MPS2,
-    inner_accelerations_mps2,
     making_way,
     neighbours_in_lanes,
+    on_endless_lanes,
 )
 from coramp.mixed.on_board import driven_mps2, neighbours_of
+from coramp.networks.limits import Limits
+from coramp.worlds.sumo.mixed_lanes import allowed_mps
 from tests.mixed.roads import ON_BOARD, SAFETY, at_once, users_of
 
 B_MPS2 = SAFETY.braking_mps2
@@ -35,8 +37,7 @@ def chosen_among(rows, told_mps2=-1.0, laws=ON_BOARD):
     around, ahead = neighbours_in_lanes(users, lane), at_once(users)
     held = users.automated & (lane == 0)
     told = np.where(held, told_mps2, np.inf)
-    inner = inner_accelerations_mps2(users, around, ahead, laws)
-    return making_way(users, around, ahead, held, told, inner, laws).tolist()
+    return making_way(users, around, ahead, held, told, on_endless_lanes(laws)).tolist()
 
 
 @settings(max_examples=200, deadline=None)
@@ -164,3 +165,11 @@ def test_two_do_not_change_into_one_gap_at_once():
     assert chosen_among(pair) == [0]
     apart = [*pair, (1, -20.0, 20.0, True)]
     assert chosen_among(apart) == [0, 1]
+
+
+def test_limits_of_many_stations_are_those_of_each():
+    limits = Limits((-300.0, -50.0, 0.0, 50.0), (20.0, 10.0, 12.5, 8.33))
+    stations_m = [-1e3, -300.0, -200.3, -60.0, -50.0, -1e-9, 0.0, 17.7, 49.9, 50.0, 1e6]
+    expected = [limits.allowed_mps(at_m) for at_m in stations_m]
+    assert allowed_mps(limits, np.array(stations_m)).tolist() == expected
+    assert allowed_mps(limits, np.empty(0)).tolist() == []

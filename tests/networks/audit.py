@@ -51,3 +51,23 @@ def lanes_of(network):
     raw = network.read_bytes()
     root = ET.fromstring(gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw)
     return {lane.get("id"): float(lane.get("length")) for lane in root.iter("lane")}
+
+
+def too_near(folder, chosen, braking_mps2):
+    """Pairs of which the rear one, one of those chosen, could not stop behind a front that brakes.
+
+    Both brake alike: gap + v_f^2 / 2b < v_r^2 / 2b. Time, rear and front vehicle, and what is
+    missing (m).
+    """
+    length_m = lengths_m(folder / "sumo" / "routes.rou.xml")
+    found = []
+    columns = ("vehicle_pos", "vehicle_speed", "vehicle_id")
+    for (time_s, _), on_lane in positions(folder).group_by("timestep_time", "vehicle_lane"):
+        for (rear_m, rear_mps, rear), (front_m, front_mps, front) in pairwise(
+            sorted(on_lane.select(columns).iter_rows())
+        ):
+            gap_m = front_m - length_m[front] - rear_m
+            left_m = gap_m + (front_mps**2 - rear_mps**2) / (2.0 * braking_mps2)
+            if rear in chosen and left_m < 0.0:
+                found.append((time_s, rear, front, left_m))
+    return found

@@ -1,5 +1,6 @@
 """Runs on several lanes, and in networks, as they are drawn."""
 
+import itertools
 import math
 
 import pytest
@@ -92,7 +93,7 @@ def test_a_networks_lanes_are_told_as_they_lie(tmp_path, name):
         ends_m = scenario.ramp.acceleration_lane_m if lane < 0 else scenario.mainline.end_m
         starts_m = scenario.ramp.start_m if lane < 0 else scenario.mainline.start_m
         assert (own[0]["from"], own[-1]["to"]) == pytest.approx((starts_m, ends_m), abs=0.02)
-        for before, after in zip(own, own[1:], strict=False):
+        for before, after in itertools.pairwise(own):
             assert before["to"] == pytest.approx(after["from"], abs=0.02)
             assert math.dist(before["xy"][-2:], after["xy"][:2]) < 1.0
     beside = next(s for s in shapes if s["lane"] == 0 and s["from"] == 0.0)

@@ -4,11 +4,19 @@ A vehicle of the ramp is beside the mainline's outermost lane, one of a mainline
 next lane further in. On each lane all keep the same law.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
 from coramp.mixed.laws import OnBoardLaws
-from coramp.mixed.on_board import Ahead, Neighbours, driven_mps2, may_be_between
+from coramp.mixed.on_board import (
+    Ahead,
+    Neighbours,
+    driven_and_changes,
+    driven_mps2,
+    may_be_between,
+)
 from coramp.mixed.users import NOBODY, RoadUsers
 
 RAMP_LANE, OUTERMOST = -1, 0
@@ -19,6 +27,16 @@ HELD_MPS2 = -0.2
 """Who is told to slow down by so much, or more, for a vehicle that merges may make way instead."""
 GAIN_MPS2 = 0.2
 """By so much at least it must be able to drive with more in the other lane."""
+
+
+class Lanes(NamedTuple):
+    """The lane of each vehicle, and whether it can change to the next one further in.
+
+    ``number`` is ``RAMP_LANE``, or that of the mainline from the outermost, 0, on.
+    """
+
+    number: IntArray
+    beside: BoolArray
 
 
 @kernel
@@ -46,44 +64,79 @@ def on_endless_lanes(laws: OnBoardLaws) -> OnBoardLaws:
     return laws._replace(safety=laws.safety._replace(lane_end_m=ENDLESS_M))
 
 
+@kernel
+def decided_in_lanes(
+    users: RoadUsers,
+    lanes: Lanes,
+    ahead: Ahead,
+    told_mps2: FloatArray,
+    wishes: BoolArray,
+    laws: OnBoardLaws,
+    endless: OnBoardLaws,
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Returns what each vehicle obeys, its acceleration (m/s2), and who changes lanes.
+
+    ``told_mps2`` is the most that each is told to speed up, ``wishes`` who on the acceleration lane
+    wishes to merge; ``endless`` are the laws ``on_endless_lanes``. Who makes way obeys nothing any
+    more, since what it was told is for the lane that it leaves.
+    """
+    around = neighbours_in_lanes(users, lanes.number)
+    changes = driven_and_changes(users, around, ahead, told_mps2, wishes, laws)[1]
+    held = users.automated & (lanes.number == OUTERMOST) & lanes.beside
+    held &= users.station_m < laws.safety.lane_end_m
+    for own in range(len(changes)):
+        if changes[own] and around.rear[own] >= 0:
+            held[around.rear[own]] = False  # one thing at a time: its new leader comes in now
+    obeys_mps2 = told_mps2.copy()
+    for own in making_way(users, around, ahead, held, told_mps2, endless):
+        changes[own], obeys_mps2[own] = True, np.inf
+    accel_mps2 = driven_mps2(users, around, ahead, obeys_mps2, changes, laws)
+    return obeys_mps2, accel_mps2, changes
+
+
+@kernel
 def making_way(
     users: RoadUsers,
     around: Neighbours,
     ahead: Ahead,
     held: BoolArray,
     told_mps2: FloatArray,
-    inner_mps2: FloatArray,
-    laws: OnBoardLaws,
+    endless: OnBoardLaws,
 ) -> IntArray:
     """Returns which of those ``held`` back change to the lane further in, front first.
 
-    Each is told to slow down for a vehicle that merges (``told_mps2``), and could drive with
-    ``inner_mps2`` further in: it must gain by it. The change is safe on both lanes: it stays where
-    it is until it is over, and leaves who is before and behind it there what they need. Two do not
-    change into one gap at once.
+    Each is told to slow down for a vehicle that merges (``told_mps2``), and gains by what it can
+    drive with further in. The change is safe on both lanes: it stays where it is until it is over,
+    keeps its distance in both, and leaves who is before and behind it there what they need, however
+    much it slows down meanwhile. Two do not change into one gap at once.
     """
-    found: list[int] = []
-    taken: set[tuple[int, int]] = set()
-    endless = on_endless_lanes(laws)
-    wants = held & (told_mps2 <= HELD_MPS2) & (inner_mps2 >= told_mps2 + GAIN_MPS2)
-    own_places = np.flatnonzero(wants)
-    for own in own_places[np.argsort(-users.station_m[own_places], kind="stable")].tolist():
-        gap = int(around.front[own]), int(around.rear[own])
+    count = len(users.number)
+    wants = held & (told_mps2 <= HELD_MPS2)
+    found, places = np.empty(count, np.int64), 0
+    if not wants.any():
+        return found[:0]
+    inner_mps2 = inner_accelerations_mps2(users, around, ahead, endless)
+    both_mps2 = driven_mps2(users, around, ahead, told_mps2, wants, endless)
+    taken = np.zeros(count + 1, np.bool_)  # a gap is known by who is before it
+    for own in np.argsort(-users.station_m, kind="mergesort"):
+        gap = around.front[own] + 1
+        if not wants[own] or taken[gap] or inner_mps2[own] < told_mps2[own] + GAIN_MPS2:
+            continue
         slowest_mps = min(users.speed_mps[own], ahead.speed_mps[own])
-        slowest_mps += min(0.0, float(told_mps2[own])) * laws.period_s
-        if gap not in taken and may_be_between(
-            users, own, around, ahead, max(0.0, slowest_mps), endless
-        ):
-            found.append(own)
-            taken.add(gap)
-    return np.array(found, np.int64)
+        slowest_mps = max(0.0, slowest_mps + min(0.0, both_mps2[own]) * endless.period_s)
+        if may_be_between(users, own, around, ahead, slowest_mps, endless):
+            found[places] = own
+            places += 1
+            taken[gap] = True
+    return found[:places]
 
 
+@kernel
 def inner_accelerations_mps2(
-    users: RoadUsers, around: Neighbours, ahead: Ahead, laws: OnBoardLaws
+    users: RoadUsers, around: Neighbours, ahead: Ahead, endless: OnBoardLaws
 ) -> FloatArray:
     """Returns with what each vehicle (m/s2) could drive behind who is ahead of it further in."""
-    nobody = np.full(len(users.number), NOBODY)
+    count = len(users.number)
+    nobody, free = np.full(count, NOBODY), np.full(count, np.inf)
     there = Neighbours(around.front, nobody, nobody)
-    free, none = np.full(len(nobody), np.inf), np.zeros(len(nobody), np.bool_)
-    return np.asarray(driven_mps2(users, there, ahead, free, none, on_endless_lanes(laws)))
+    return driven_mps2(users, there, ahead, free, np.zeros(count, np.bool_), endless)

@@ -144,7 +144,9 @@ def laned_spans(site: OnRamp) -> dict[str, LaneSpan]:
         edge, _, index = stretch.lane_id.rpartition("_")
         beside = stretch.code in (ACCELERATION_LANE, MAINLINE) and not edge.startswith(":")
         changes = beside and f"{edge}_{int(index) + 1}" in names
-        found[stretch.lane_id] = LaneSpan(stretch.start_m, stretch.metres_per_metre, lane, changes)
+        found[stretch.lane_id] = LaneSpan(
+            stretch.start_m, stretch.end_m, stretch.metres_per_metre, lane, changes
+        )
     return found
 
 

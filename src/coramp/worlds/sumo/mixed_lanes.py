@@ -1,25 +1,23 @@
 """Automated vehicles among drivers on several lanes: their lanes, and how they make way."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.mixed.lanes import (
-    OUTERMOST,
-    RAMP_LANE,
-    inner_accelerations_mps2,
-    making_way,
-    neighbours_in_lanes,
-)
-from coramp.mixed.on_board import Ahead, Neighbours, driven_mps2, may_change_lane
+from coramp.mixed.lanes import OUTERMOST, RAMP_LANE, Lanes, decided_in_lanes, on_endless_lanes
+from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import RoadUsers
-from coramp.networks.limits import Limits
+from coramp.networks.limits import SLOWS_MPS2, Limits
 from coramp.worlds.sumo.lanes import LanedRoad
 from coramp.worlds.sumo.mixed import Control, Driven, Moment
 from coramp.worlds.sumo.mixed_plant import Foresees, MixedPlant
 from coramp.worlds.sumo.network import LaneSpan
+
+TO_LANE_END_M = 1.0
+"""Nobody is told to change lanes who would come so near to his lane's end within a period."""
 
 
 @dataclass
@@ -27,57 +25,58 @@ class LanedPlant(MixedPlant):
     """The vehicles of a session on a road of several lanes.
 
     ``lane`` is the number of each user's lane at the last look, from the outermost of the mainline
-    on, or ``RAMP_LANE``; ``beside`` is who can change from it to the next one further in. Each
-    cruises no faster than the limits where it is, and ahead, let it.
+    on, or ``RAMP_LANE``; ``beside`` is who can change from it to the next one further in, and stays
+    beside that for another period. Each cruises no faster than the limits where it is, and ahead,
+    let it.
     """
 
     road: LanedRoad | None = None
     lane: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     beside: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
+    _table: "_Table | None" = None
     _sumo_lane: dict[str, int] = field(default_factory=dict)
 
     def is_on(self, road: LanedRoad) -> None:
         """Is told its road."""
-        self.road = road
+        self.road, self._table = road, _Table.of(road.lanes)
 
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who may leave the acceleration lane, and all that is on the road."""
-        assert self.road is not None
+        assert self._table is not None
         names, lanes, position_m, sumo_mps = self.session.everyone()
-        spans = [self.road.lanes[lane] for lane in lanes]
-        number = np.array([self.able.number[name] for name in names], np.int64)
-        station_m = _stations_m(spans, position_m)
+        able, number_of, table = self.able, self.able.number, self._table
+        place_of = table.places
+        number = np.array([number_of[name] for name in names], np.int64)
+        place = np.array([place_of[lane] for lane in lanes], np.int64)
+        station_m = table.start_m[place] + np.array(position_m) * table.per_m[place]
         speed_mps, accel_mps2 = self._measured(number, station_m, sumo_mps)
-        self.lane = np.array([span.lane for span in spans], np.int64)
-        self._sumo_lane = {
-            name: int(lane.rpartition("_")[2]) for name, lane in zip(names, lanes, strict=True)
-        }
+        self.lane = table.lane[place]
+        self._sumo_lane = dict(zip(names, table.sumo_lane[place].tolist(), strict=True))
         users = RoadUsers(
             number,
             station_m,
             speed_mps,
             accel_mps2,
-            self.able.length_m[number],
+            able.length_m[number],
             self.lane > RAMP_LANE,
-            self.able.automated[number],
-            np.minimum(self.able.cruise_mps[number], self._allowed_mps(station_m)),
-            self.able.acceleration_mps2[number],
-            self.able.power_wpkg[number],
-            self.able.braking_mps2[number],
+            able.automated[number],
+            np.minimum(able.cruise_mps[number], self._allowed_mps(station_m)),
+            able.acceleration_mps2[number],
+            able.power_wpkg[number],
+            able.braking_mps2[number],
         )
-        self.beside = np.array([span.changes for span in spans], np.bool_)
-        return names, self.beside & (self.lane == RAMP_LANE), users
+        may_leave = table.changes[place] & (self.lane == RAMP_LANE)
+        # a lane's number is another one beyond its end, so that nobody is told of it near there
+        stays = station_m + speed_mps * self.period_s + TO_LANE_END_M < table.end_m[place]
+        self.beside = table.changes[place] & stays
+        return names, may_leave, users
 
     def _allowed_mps(self, station_m: FloatArray) -> FloatArray:
         """What the limits of each one's road let it drive."""
         assert self.road is not None
-        allowed = np.empty(len(station_m))
-        for way, own in (
-            (self.road.mainline, self.lane > RAMP_LANE),
-            (self.road.ramp, self.lane == RAMP_LANE),
-        ):
-            allowed[own] = _allowed_mps(way.limits, station_m[own])
-        return allowed
+        mainline_mps = allowed_mps(self.road.mainline.limits, station_m)
+        ramp_mps = allowed_mps(self.road.ramp.limits, station_m)
+        return np.where(self.lane > RAMP_LANE, mainline_mps, ramp_mps)
 
     def _change_lane(self, name: str) -> None:
         """Has a vehicle change to the next lane further in; SUMO refuses what would collide."""
@@ -85,15 +84,40 @@ class LanedPlant(MixedPlant):
         self.session.change_lane_if_clear(name, self._sumo_lane[name] + 1, max(time_s, self.step_s))
 
 
-def _stations_m(spans: list[LaneSpan], position_m: list[float]) -> FloatArray:
-    start_m = np.array([span.start_m for span in spans], np.float64)
-    per_m = np.array([span.per_m for span in spans], np.float64)
-    return start_m + np.array(position_m, np.float64) * per_m
+class _Table(NamedTuple):
+    """SUMO's lanes as arrays, with the place of each in them."""
+
+    places: Mapping[str, int]
+    start_m: FloatArray
+    end_m: FloatArray
+    per_m: FloatArray
+    lane: IntArray
+    sumo_lane: IntArray
+    changes: BoolArray
+
+    @classmethod
+    def of(cls, lanes: Mapping[str, LaneSpan]) -> "_Table":
+        spans = list(lanes.values())
+        return cls(
+            {name: place for place, name in enumerate(lanes)},
+            np.array([span.start_m for span in spans], np.float64),
+            np.array([span.end_m for span in spans], np.float64),
+            np.array([span.per_m for span in spans], np.float64),
+            np.array([span.lane for span in spans], np.int64),
+            np.array([int(name.rpartition("_")[2]) for name in lanes], np.int64),
+            np.array([span.changes for span in spans], np.bool_),
+        )
 
 
-def _allowed_mps(limits: Limits, station_m: FloatArray) -> FloatArray:
-    """``Limits.allowed_mps`` of many stations."""
-    return np.array([limits.allowed_mps(at_m) for at_m in station_m.tolist()], np.float64)
+def allowed_mps(limits: Limits, station_m: FloatArray) -> FloatArray:
+    """Returns ``Limits.allowed_mps`` (m/s) of many stations, to the last bit."""
+    here = np.searchsorted(limits.from_m, station_m, side="right") - 1
+    allowed = np.array(limits.limit_mps)[np.maximum(here, 0)]
+    for k in range(1, len(limits.from_m)):
+        ahead_m = limits.from_m[k] - station_m
+        slows_mps = np.sqrt(limits.limit_mps[k] ** 2 + 2.0 * SLOWS_MPS2 * np.maximum(ahead_m, 0.0))
+        allowed = np.where(k > here, np.minimum(allowed, slows_mps), allowed)
+    return allowed
 
 
 class InLanes(Protocol):
@@ -137,16 +161,14 @@ class LanedControl(Control):
 
     def driven(self, moment: Moment, plant: Foresees) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board."""
-        users, lane, laws = moment.users, self._lane, self.laws
-        most_mps2, may_merge = self._told(moment, lane)
-        around, ahead = neighbours_in_lanes(users, lane), plant.ahead(users)
-        wishes = may_merge & moment.able & users.automated & (lane == RAMP_LANE)
-        changes = self._merging(users, around, ahead, most_mps2, wishes)
-        for own in self._making_way(moment, around, ahead, most_mps2, changes):
-            changes[own] = True
-            most_mps2[own] = np.inf  # what it was told is for the lane that it leaves
-        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, changes, laws)
-        return Driven(most_mps2, wishes, accel_mps2, changes)
+        users, laws = moment.users, self.laws
+        most_mps2, may_merge = self._told(moment, self._lane)
+        lanes = Lanes(self._lane, self._beside)
+        wishes = may_merge & moment.able & users.automated & (lanes.number == RAMP_LANE)
+        obeys_mps2, accel_mps2, changes = decided_in_lanes(
+            users, lanes, plant.ahead(users), most_mps2, wishes, laws, on_endless_lanes(laws)
+        )
+        return Driven(obeys_mps2, wishes, accel_mps2, changes)
 
     def _told(self, moment: Moment, lane: IntArray) -> tuple[FloatArray, BoolArray]:
         """What those of the outer lanes were told; others are told nothing."""
@@ -159,46 +181,6 @@ class LanedControl(Control):
         if self.notes is not None:
             self.notes.told(moment.now_s, own, moment.seen, most_mps2[outer], self.air)
         return most_mps2, may_merge
-
-    def _merging(
-        self,
-        users: RoadUsers,
-        around: Neighbours,
-        ahead: Ahead,
-        most_mps2: FloatArray,
-        wishes: BoolArray,
-    ) -> BoolArray:
-        """Which of those on the acceleration lane that wish to merge may."""
-        changes = np.zeros(len(wishes), np.bool_)
-        if not wishes.any():
-            return changes
-        accel_mps2 = driven_mps2(users, around, ahead, most_mps2, wishes, self.laws)
-        slower_mps = users.speed_mps + np.minimum(0.0, accel_mps2) * self.laws.period_s
-        slowest_mps = np.minimum(slower_mps, ahead.speed_mps)
-        for own in np.flatnonzero(wishes).tolist():
-            slowest = slowest_mps[own]
-            changes[own] = may_change_lane(users, own, around, ahead, slowest, self.laws)
-        return changes
-
-    def _making_way(
-        self,
-        moment: Moment,
-        around: Neighbours,
-        ahead: Ahead,
-        most_mps2: FloatArray,
-        merging: BoolArray,
-    ) -> list[int]:
-        """Which vehicles of the outermost lane change to the lane further in."""
-        users, lane = moment.users, self._lane
-        held = users.automated & (lane == OUTERMOST) & self._beside & np.isfinite(most_mps2)
-        held &= users.station_m < self.laws.safety.lane_end_m
-        beside = around.rear[merging]
-        held[beside[beside >= 0]] = False  # one thing at a time: its new leader comes in now
-        if not (held & (most_mps2 < 0.0)).any():
-            return []
-        inner_mps2 = inner_accelerations_mps2(users, around, ahead, self.laws)
-        chosen = making_way(users, around, ahead, held, most_mps2, inner_mps2, self.laws)
-        return [int(own) for own in chosen]
 
     def note(
         self, moment: Moment, ahead: Ahead, accel_mps2: FloatArray, changes: BoolArray

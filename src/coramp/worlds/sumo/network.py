@@ -40,13 +40,14 @@ def sumo_binary(name: str) -> str:
 
 
 class LaneSpan(NamedTuple):
-    """Where one of SUMO's lanes lies: the station at which it begins, metres of station a metre.
+    """Where one of SUMO's lanes lies: the stations between which, and metres of station a metre.
 
     ``lane`` is its number: that of the mainline, 0 next to the ramp, or ``RAMP_LANE``. ``changes``
     tells that a vehicle can change from it to the next lane of the mainline further in.
     """
 
     start_m: float
+    end_m: float
     per_m: float
     lane: int
     changes: bool
@@ -83,10 +84,12 @@ class RoadPlan:
 
     def spans(self) -> dict[str, LaneSpan]:
         """Returns where each lane lies on a road of one mainline lane, as ``lane_starts_m``."""
-        return {
-            lane: LaneSpan(start_m, 1.0, RAMP_LANE if lane in RAMP_LANES else 0, lane == "merge_0")
-            for lane, start_m in self.lane_starts_m().items()
-        }
+        found, length_m = {}, self.lane_lengths_m()
+        for lane, start_m in self.lane_starts_m().items():
+            number = RAMP_LANE if lane in RAMP_LANES else 0
+            end_m = start_m + length_m.get(lane, 0.0)
+            found[lane] = LaneSpan(start_m, end_m, 1.0, number, lane == "merge_0")
+        return found
 
     def lane_lengths_m(self) -> dict[str, float]:
         """Returns the length that each lane must have."""
