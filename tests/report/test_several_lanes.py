@@ -1,19 +1,22 @@
 """Runs on several lanes, and in networks, as they are drawn."""
 
-import itertools
 import math
+from itertools import pairwise
 
 import pytest
 
+from coramp.agency.before_after import Measured
 from coramp.report.page.network_shown import shapes_data
 from coramp.report.page.pages import replay_page
 from coramp.report.page.shown import page_data, road_data
+from coramp.report.page.summary import SEVERAL_LANES, summary_of
 from coramp.report.time_space_figure import run_time_space_figure
 from coramp.scenarios.loading import load_scenario
+from tests.agency import run_by_hand
 from tests.metrics import PAPER
 from tests.networks.test_runs import new_scenario
 from tests.report.browser import chromium, in_browser, opened
-from tests.report.lanes import CHANGES_S, three_lanes
+from tests.report.lanes import CARS, CHANGES_S, three_lanes
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +61,13 @@ def test_each_lane_has_a_diagram_with_its_vehicles(run):
     assert min(shown_s) == CHANGES_S
 
 
+def test_a_summary_says_which_lanes_it_is_of(run):
+    found = summary_of([Measured(run)])
+    assert "mean of all 3 lanes" in found["pictures"][0]["text"]
+    assert found["table"].notes[-1] == SEVERAL_LANES
+    assert SEVERAL_LANES not in summary_of([Measured(run_by_hand(CARS, 80.0))])["table"].notes
+
+
 @in_browser
 def test_a_replay_draws_each_lane_apart(run, tmp_path):
     path = tmp_path / "replay.html"
@@ -93,7 +103,7 @@ def test_a_networks_lanes_are_told_as_they_lie(tmp_path, name):
         ends_m = scenario.ramp.acceleration_lane_m if lane < 0 else scenario.mainline.end_m
         starts_m = scenario.ramp.start_m if lane < 0 else scenario.mainline.start_m
         assert (own[0]["from"], own[-1]["to"]) == pytest.approx((starts_m, ends_m), abs=0.02)
-        for before, after in itertools.pairwise(own):
+        for before, after in pairwise(own):
             assert before["to"] == pytest.approx(after["from"], abs=0.02)
             assert math.dist(before["xy"][-2:], after["xy"][:2]) < 1.0
     beside = next(s for s in shapes if s["lane"] == 0 and s["from"] == 0.0)

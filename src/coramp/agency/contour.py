@@ -43,9 +43,10 @@ class Road(NamedTuple):
 
     def pieces(self, motion: Motion) -> BoolArray:
         """Returns which pieces of a motion are on it."""
-        if self.lane is not None:
-            return motion.lane == self.lane
-        return motion.on_mainline == self.is_mainline
+        whole = self.lane is None
+        return np.asarray(
+            motion.on_mainline == self.is_mainline if whole else motion.lane == self.lane, np.bool_
+        )
 
 
 def road_of(scenario: Scenario, name: str) -> Road:

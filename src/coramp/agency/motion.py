@@ -54,7 +54,7 @@ class Motion:
     @cached_property
     def on_mainline(self) -> BoolArray:
         """Which pieces are on the mainline, on whichever lane."""
-        return self.lane >= 0
+        return np.asarray(self.lane >= 0, np.bool_)
 
     @property
     def finished(self) -> BoolArray:

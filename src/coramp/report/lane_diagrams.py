@@ -1,7 +1,7 @@
 """Time-space diagrams of a mainline of several lanes, one for each."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -55,7 +55,7 @@ def _lane_at(stays: pl.DataFrame, times_s: FloatArray) -> IntArray:
 
 
 def _draw(axes: Axes, name: str, line: Line, here: BoolArray) -> None:
-    drawn = {"color": line.colour, "linewidth": line.width_pt}
+    drawn: dict[str, Any] = {"color": line.colour, "linewidth": line.width_pt}
     if not here.all():
         axes.plot(line.times_s, line.stations_m, alpha=FAINT, gid=f"{name} faint", **drawn)
     if here.any():

@@ -54,7 +54,7 @@ def run_time_space_figure(
             look = _look(way, name in moved, automated.get(name))
             lines[name] = Line(times_s, stations_m, *look)
     if lanes > 1:
-        draw_by_lane(run, diagrams, lines)
+        draw_by_lane(run, list(diagrams), lines)
     else:
         for name, line in lines.items():
             axes.plot(

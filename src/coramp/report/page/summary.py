@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from coramp.agency.before_after import Change, Measured, Pairs, changes
 from coramp.agency.figures import FIGURES
@@ -66,9 +65,7 @@ def names_of(runs: Sequence[Measured]) -> list[str]:
 def _part(words: Iterator[str], table: Table, runs: Sequence[Measured], unit: SpeedUnit) -> Row:
     names = names_of(runs)
     seed = f"seed {runs[0].run.summary['seed']}"
-    lanes = max(measured.run.scenario.mainline.lanes for measured in runs)
-    if lanes > 1:
-        table = replace(table, notes=(*table.notes, SEVERAL_LANES))
+    lanes = _lanes(runs)
     return {
         "words": list(words),
         "table": table,
@@ -80,6 +77,16 @@ def _part(words: Iterator[str], table: Table, runs: Sequence[Measured], unit: Sp
             picture(QUEUED.format(seed), queue_figure(runs, names)),
         ],
     }
+
+
+def _lanes(runs: Sequence[Measured]) -> int:
+    """The most mainline lanes of runs."""
+    return max(measured.run.scenario.mainline.lanes for measured in runs)
+
+
+def _meaning(lanes: int) -> tuple[str, ...]:
+    """What is said below the figures."""
+    return (MEANING, SEVERAL_LANES) if lanes > 1 else (MEANING,)
 
 
 def _asked(measured: Measured, seeds: int) -> str:
@@ -201,7 +208,10 @@ def _table_of_one(measured: Measured) -> Table:
         if measured.figures[key] is not None
     ]
     return Table(
-        "What came of it", ("what", "value"), (*rows, (LETTER, measured.letter)), (MEANING,)
+        "What came of it",
+        ("what", "value"),
+        (*rows, (LETTER, measured.letter)),
+        _meaning(_lanes([measured])),
     )
 
 
@@ -214,10 +224,10 @@ def _table(pairs: Pairs, found: Sequence[Change]) -> Table:
         rows.append((figure.label, *texts, with_interval(change.change, figure.digits)))
     letters = [" to ".join(sorted({m.letter for m in runs})) for runs in zip(*pairs, strict=True)]
     rows.append((LETTER, *letters, "-"))
-    seeds = len(pairs)
+    seeds, lanes = len(pairs), _lanes([one for pair in pairs for one in pair])
     title = (
         f"Means of {seeds} seeds, with 95 % intervals of the difference"
         if seeds > 1
         else (f"Before and after, seed {pairs[0][0].run.summary['seed']}")
     )
-    return Table(title, ("what", BEFORE, AFTER, "difference"), tuple(rows), (MEANING,))
+    return Table(title, ("what", BEFORE, AFTER, "difference"), tuple(rows), _meaning(lanes))
