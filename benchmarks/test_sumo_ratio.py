@@ -27,6 +27,25 @@ LANES_AT_MOST, LANES_AIM = 6.0, 1.5
 """Of runs on three lanes with all vehicles automated; the aim is not reached yet."""
 SLOTS_AT_LEAST, SLOTS_AIM = 3.0, 8.0
 """Slots plans every vehicle, not those of the ramp alone; the aim is not reached yet."""
+THREE_LANES = """
+[mainline]
+start_m = -600.0
+end_m = 600.0
+speed_mps = 27.78
+lanes = 3
+flow_veh_h = 5400.0
+
+[ramp]
+start_m = -400.0
+speed_mps = 20.0
+acceleration_lane_m = 200.0
+flow_veh_h = 900.0
+
+[safety]
+time_gap_s = 1.0
+standstill_gap_m = 2.0
+"""
+"""The road of docs/how-to/networks.md."""
 
 
 @pytest.mark.parametrize("strategy", ["mainline-priority", "ramp-priority"])
@@ -82,16 +101,9 @@ def test_mixed_run_against_plain_sumo(benchmark, monkeypatch, tmp_path, preset):
 
 
 def test_run_on_three_lanes_against_plain_sumo(benchmark, monkeypatch, tmp_path):
-    overrides = {
-        "mainline.lanes": 3,
-        "mainline.speed_mps": 27.78,
-        "mainline.flow_veh_h": 5400.0,
-        "ramp.flow_veh_h": 900.0,
-        "safety.time_gap_s": 1.0,
-        "safety.standstill_gap_m": 2.0,
-        "horizon_s": 300.0,
-    }
-    scenario, chosen = load_scenario("paper", overrides), strategy_named("mixed-slots")()
+    (tmp_path / "three.toml").write_text(THREE_LANES)
+    scenario = load_scenario(str(tmp_path / "three.toml"), {"simulation.horizon_s": 300.0})
+    chosen = strategy_named("mixed-slots")()
     mixed.run_mixed(scenario, chosen, "credible", 1, SumoOptions(keep_in=tmp_path / "kept"))
     plain, ours = [], []
 

@@ -186,6 +186,7 @@ def test_a_driver_behind_need_not_brake_harder_than_in_comfort(situation):
     )
 )
 @example(([WAY, *GAP], HELD[:3], [False] * 3, 1, 0.0))
+@example(([(0, 198.0, 20.0, True, 5.0, 6.0, 0.0)], HELD[:1], [False], 2, 0.0))
 def test_who_makes_way_has_a_gap_to_itself_and_is_told_to_slow_down(situation):
     rows, told, wishes, lanes, _ = situation
     _, changes = decided(situation)
