@@ -162,6 +162,20 @@ def test_who_merged_onto_an_empty_road_lets_others_in_at_the_next_site(tmp_path,
     assert result.sites["stopped_vehicles"].sum() == 0
 
 
+def test_two_that_stand_for_each_other_go_on(tmp_path, a10kw):
+    """One at the lane's end, and 0.9 m behind it on the mainline one that leaves it the way."""
+    keys = {
+        "sites": ["24498409@4054057", "308396220@264308374"],
+        "mainline_flow_veh_h": 4800.0,
+        "ramp_flow_veh_h": [600.0, 600.0],
+        "exits": [{"edge": edge, "share": 0.1} for edge in ("151495034", "151495018")],
+    }
+    path = written(tmp_path, a10kw, 0.5, 300.0, **keys)
+    result = coramp.corridor(path, overrides={"simulation.drain_s": 150.0})
+    assert result.summary["stopped_vehicles"] > 0
+    assert result.summary["unserved"] == result.summary["collisions"] == 0
+
+
 def test_zones_without_an_exit_between_them_are_passed_one_after_the_other(tmp_path, without_exit):
     """The second site's mainline begins behind the first one's acceleration lane."""
     path = written(tmp_path, without_exit, 1.0, 60.0, exits=[], upstream_m=400.0)

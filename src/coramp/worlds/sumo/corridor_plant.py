@@ -15,6 +15,8 @@ from coramp.worlds.sumo.corridor_sites import SiteAnswer, SiteView
 from coramp.worlds.sumo.mixed_lanes import LanedPlant
 
 NO_SITE = -1
+REFUSED_S = 1.0
+"""So long SUMO may refuse a merge of a vehicle that stands, and that the law on board allows."""
 
 
 class Found(NamedTuple):
@@ -63,6 +65,7 @@ class CorridorPlant(LanedPlant):
     commands: bool = True
     _held: dict[int, tuple[str, int]] = field(default_factory=dict)
     _from_ramp: set[int] = field(default_factory=set)
+    _refused: dict[int, int] = field(default_factory=dict)
     _seen: set[int] = field(default_factory=set)
 
     @property
@@ -233,8 +236,24 @@ class CorridorPlant(LanedPlant):
         for i in np.flatnonzero(users.on_mainline & users.automated).tolist():
             if int(users.number[i]) in self._from_ramp:
                 self._from_ramp.discard(int(users.number[i]))
+                self._refused.pop(int(users.number[i]), None)
                 self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
                 self.session.take_over(names[i])
+
+    def _change_lane(self, name: str) -> None:
+        """Has a vehicle change to the next lane further in, as SUMO allows.
+
+        SUMO refuses gaps below the standstill gap of who is behind. Where both stand on less, which
+        the law on board allows, neither would ever go on: then it changes without SUMO's check.
+        """
+        number = self.able.number[name]
+        if number in self._from_ramp and self._sent_mps[number] == 0.0:
+            tried = self._refused[number] = self._refused.get(number, 0) + 1
+            if tried * self.period_s > REFUSED_S:
+                lane = self._sumo_lane[name] + 1
+                self.session.change_lane_now(name, lane, self.period_steps)
+                return
+        super()._change_lane(name)
 
     def obey(self, zones: Sequence[ZoneUsers], answers: Sequence[SiteAnswer]) -> None:
         """Has the automated vehicles of all zones do what their coordinators answer."""
