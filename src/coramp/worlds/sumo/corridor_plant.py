@@ -247,7 +247,7 @@ class CorridorPlant(LanedPlant):
         the law on board allows, neither would ever go on: then it changes without SUMO's check.
         """
         number = self.able.number[name]
-        if number in self._from_ramp and self._sent_mps[number] == 0.0:
+        if number in self._from_ramp and self._motion.sent_mps[number] == 0.0:
             tried = self._refused[number] = self._refused.get(number, 0) + 1
             if tried * self.period_s > REFUSED_S:
                 lane = self._sumo_lane[name] + 1
