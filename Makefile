@@ -38,10 +38,10 @@ demo: $(INSTALLED)
 	$(BIN)/coramp report out/demo
 
 test: $(INSTALLED)
-	$(BIN)/pytest -n auto --dist loadfile
+	$(BIN)/pytest -n auto --dist loadgroup --no-loadscope-reorder
 
 coverage: $(INSTALLED)
-	$(BIN)/pytest -n auto --dist loadfile --cov --cov-report=term --cov-report=html:out/coverage
+	$(BIN)/pytest -n auto --dist loadgroup --no-loadscope-reorder --cov --cov-report=term --cov-report=html:out/coverage
 
 wheel: $(INSTALLED)
 	$(BIN)/python -m tests.wheel

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from coramp.kinematics.fuel import fuel_rate_mlps, piece_fuel_l, trajectory_fuel_l
+from coramp.kinematics.fuel import (
+    PASSENGER_CAR,
+    fuel_rate_mlps,
+    piece_fuel_l,
+    trajectory_fuel_l,
+)
 from tests.mathematics import close, pieces, sampled, trajectories
 
 
@@ -36,9 +41,9 @@ def test_fuel_of_a_trajectory_counts_only_the_span():
     way = pieces(0.0, 0.0, 16.0, [(16.0, 10.0), (20.0, 2.0)])
     # 5 s at 16 m/s (0.1569 + 0.392 - 0.189824 + 0.244736), the 2 s above, 3 s at 20 m/s
     expected_l = 5 * 0.603812e-3 + 0.010077072 + 3 * 0.8283e-3
-    assert trajectory_fuel_l(way, 5.0, 15.0) == pytest.approx(expected_l, rel=1e-9)
-    assert trajectory_fuel_l(way, 15.0, 15.0) == 0.0
-    assert trajectory_fuel_l(way, 15.0, 5.0) == 0.0
+    for from_s, to_s, fuel_l in [(5.0, 15.0, expected_l), (15.0, 15.0, 0.0), (15.0, 5.0, 0.0)]:
+        found_l = trajectory_fuel_l(way, from_s, to_s, PASSENGER_CAR, 1500.0)
+        assert found_l == pytest.approx(fuel_l, rel=1e-9)
 
 
 def _rate_mlps(way, time_s):
@@ -57,4 +62,5 @@ def test_fuel_of_a_trajectory_agrees_with_a_quadrature(way, after_s, lasts_s):
     expected_ml = sum(
         quad(lambda t: _rate_mlps(way, t), low, high)[0] for low, high in pairwise(cuts)
     )
-    assert trajectory_fuel_l(way, from_s, to_s) == pytest.approx(expected_ml / 1000.0, rel=1e-9)
+    found_l = trajectory_fuel_l(way, from_s, to_s, PASSENGER_CAR, 1500.0)
+    assert found_l == pytest.approx(expected_ml / 1000.0, rel=1e-9)

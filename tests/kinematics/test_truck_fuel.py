@@ -98,7 +98,7 @@ def test_fuel_of_a_trucks_trajectory_agrees_with_sampling(way, after_s, lasts_s)
 
 def test_a_car_burns_by_eq_48_whatever_its_mass():
     way = pieces(0.0, 0.0, 16.0, [(20.0, 2.0)])
-    usual_l = trajectory_fuel_l(way, 0.0, 10.0)
+    usual_l = trajectory_fuel_l(way, 0.0, 10.0, PASSENGER_CAR, 1500.0)
     assert trajectory_fuel_l(way, 0.0, 10.0, PASSENGER_CAR, 40000.0) == usual_l
     assert trajectory_fuel_l(way, 0.0, 10.0, HEAVY_DUTY, 40000.0) > 5.0 * usual_l
 

@@ -84,11 +84,7 @@ def heavy_duty_piece_fuel_l(
 
 @kernel
 def trajectory_fuel_l(
-    pieces: FloatArray,
-    from_s: float,
-    to_s: float,
-    model: int = PASSENGER_CAR,
-    mass_kg: float = math.nan,
+    pieces: FloatArray, from_s: float, to_s: float, model: int, mass_kg: float
 ) -> float:
     """Returns the fuel (l) of a trajectory between two times, exactly; 0 if ``to_s <= from_s``.
 

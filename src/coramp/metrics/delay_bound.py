@@ -104,7 +104,6 @@ def earliest_exits_s(
     return exit_s
 
 
-@kernel
 def first_come_exits_s(
     earliest_s: FloatArray, headway_s: float, saved_s: FloatArray = NOTHING_SAVED
 ) -> FloatArray:
@@ -113,6 +112,14 @@ def first_come_exits_s(
     ``saved_s[n]`` is by how much n headways together may at most be shorter than n h; what lies
     beyond its end saves as much as its last entry.
     """
+    # numba would compile a kernel with an array as a default anew in each process
+    return _first_come_exits_s(earliest_s, headway_s, saved_s)
+
+
+@kernel
+def _first_come_exits_s(
+    earliest_s: FloatArray, headway_s: float, saved_s: FloatArray
+) -> FloatArray:
     exit_s = np.empty(len(earliest_s))
     last_s, behind = -np.inf, 0
     for i in np.argsort(earliest_s, kind="mergesort"):
