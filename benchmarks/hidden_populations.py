@@ -1,4 +1,4 @@
-"""``python -m benchmarks.hidden_populations``: what calibration finds of drivers that it is not told.
+"""``python -m benchmarks.hidden_populations``: what calibration finds of hidden drivers.
 
 For each hidden population: detectors' data of some mornings is made, ``coramp calibrate`` is given
 that data alone, and the drivers that it finds are compared with the hidden ones over ten seeds of
@@ -14,6 +14,7 @@ import hashlib
 import math
 import time
 from concurrent.futures import ThreadPoolExecutor
+from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +27,6 @@ from coramp.calibration.models import SUMO_NAMES, speed_factor
 from coramp.calibration.series import capacity_veh_h, series_of
 from coramp.cli.calibration_progress import CalibrationProgress
 from coramp.scenarios.loading import load_scenario
-from coramp.scenarios.population_files import read_population
 from coramp.scenarios.sections import DriverPopulation
 from coramp.worlds.sumo.detected import build_network, detected
 
@@ -73,8 +73,6 @@ class Place:
         """Returns a scenario file with the detectors."""
         file = self.folder / f"{scenario}.toml"
         if not file.exists():
-            from importlib.resources import files
-
             text = files("coramp").joinpath(f"data/scenarios/{scenario}.toml").read_text()
             loops = (
                 f'\n[[detector]]\nid = "{name}"\nroad = "{road}"\nstation_m = {station_m}\n'
