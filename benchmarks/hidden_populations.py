@@ -131,6 +131,8 @@ def morning_file(place, hidden, mornings):
     """
     frames, seed = [], hidden.seed
     while len(frames) < mornings:
+        if seed > hidden.seed + 10 * mornings:
+            raise SystemExit(f"{hidden.name}: the flows do not make its merge break down")
         if not np.isnan(capacities_veh_h(place, hidden, hidden.drivers, [seed]))[0]:
             (frame,) = place.told(hidden.scenario, hidden.flows, hidden.drivers, [seed])
             shift_s = len(frames) * hidden.flows.horizon_s
