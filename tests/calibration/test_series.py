@@ -109,13 +109,24 @@ def test_moments_of_a_breakdown():
     found = dict(zip(names_of_moments(SITE), moments_of(BROKEN, SITE, 20.0), strict=True))
     assert found["breakdown time (s)"] == 1800.0
     assert found["highest flow before (veh/h)"] == 144.0
+    assert found["highest flow of 10 min before (veh/h)"] == (12 + 11) / 2 * 12.0
     assert found["discharge (veh/h)"] == 84.0
     assert found["ramp's share of the discharge"] == 0.25
     assert found["speed at up before (m/s)"] == pytest.approx((20.0 + 19.0 + 14.9 + 20.0) / 4)
     assert found["speed at up after (m/s)"] == pytest.approx(4.5)
     free = moments_of(five_minutes([20.0] * 4, [5, 6, 7, 8]), SITE, 20.0)
     assert free[0] == 600.0 + 1200.0
-    assert np.isnan(free[2])
+    assert free[1:4].tolist() == [8 * 12.0, 7.5 * 12.0, 130 * 12.0]
+    assert np.isnan(free[4])
+
+
+def test_what_comes_in_the_last_10_min_before_the_breakdown():
+    vehicles = {**BROKEN.vehicles, "up": np.arange(8.0), "ramp": np.arange(0.0, 80.0, 10.0)}
+    series = Series(BROKEN.begin_s, BROKEN.interval_s, vehicles, BROKEN.speed_mps)
+    found = dict(zip(names_of_moments(SITE), moments_of(series, SITE, 20.0), strict=True))
+    assert found["flow that comes in the 10 min before (veh/h)"] == (2 + 3 + 20 + 30) / 2 * 12.0
+    short = moments_of(BROKEN.between(600.0, 900.0), SITE, 20.0)
+    assert np.isnan(short[2:4]).all()
 
 
 def test_spread_of_drivers_shows_in_means_of_few():

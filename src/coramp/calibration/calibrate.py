@@ -14,7 +14,7 @@ from coramp.calibration.free_speed import FreeSpeed
 from coramp.calibration.models import AXES, speed_factor, usual_population
 from coramp.calibration.moments import moments_of, names_of_moments, onset_s
 from coramp.calibration.replayed import Replayed, driven_again
-from coramp.calibration.search import Axis, Round, search
+from coramp.calibration.search import Axis, Wanted, rounds_of, search
 from coramp.calibration.series import Series, breakdown_of
 from coramp.calibration.site import Site
 from coramp.errors import CorampError
@@ -25,8 +25,14 @@ QUANTILE = 0.8
 """A fifth of the intervals upstream are faster than about free."""
 LEAST_VEHICLES = 100
 """With fewer vehicles the mean of their speeds is off by 1 % or more."""
-ROUNDS = ((2, 0.5, 0.3), (1, 0.25, 0.2), (1, 0.12, 0.1))
-"""Quarters of the runs, half width and reach of each round."""
+ROUNDS = (
+    (0.37, 0.5, 0.3),
+    (0.21, 0.3, 0.25),
+    (0.16, 0.22, 0.2),
+    (0.13, 0.17, 0.17),
+    (0.13, 0.13, 0.15),
+)
+"""Share of the runs, half width and reach of each round: each comes nearer."""
 LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
 """Least noise of the numbers that the search compares, by what their names end in."""
 
@@ -133,12 +139,11 @@ def _searched(
         return np.array(told) - np.array(turns)
 
     floor = [LEAST_NOISE[name.rsplit(" ", 1)[-1]] for name in names_of_moments(site)]
-    rounds = [Round(quarters * effort.runs // 4, *rest) for quarters, *rest in ROUNDS]
     place, _, _ = search(
         axes,
-        rounds,
+        rounds_of(effort.runs, ROUNDS),
         simulate,
-        np.zeros(len(floor)),
+        Wanted(np.zeros(len(floor)), len(replays)),
         np.array(floor),
     )
     return at(place)

@@ -10,7 +10,7 @@ from coramp.calibration.effort import Effort
 from coramp.calibration.free_speed import FreeSpeed, free_speed
 from coramp.calibration.models import speed_factor
 from coramp.calibration.replayed import Replayed, driven_again
-from coramp.calibration.search import Axis, Round, search
+from coramp.calibration.search import Axis, Round, Wanted, search
 from coramp.calibration.series import Series, queued
 from coramp.calibration.site import Site
 from coramp.errors import CorampError
@@ -72,7 +72,7 @@ class FreeTraffic:
 
         count = effort.speed_runs
         rounds = (Round(count, 0.5, 1.0), Round(count, 0.25, 0.3))
-        measured = self._numbers(self.replayed.measured)
+        measured = Wanted(self._numbers(self.replayed.measured))
         place, _, _ = search(axes, rounds, simulate, measured, np.array(LEAST_NOISE))
         return _wishing(drivers, axes, place.tolist())
 

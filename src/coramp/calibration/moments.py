@@ -6,10 +6,12 @@ from coramp._kernel import BoolArray, FloatArray
 from coramp.calibration.series import Series, breakdown_of, queued
 from coramp.calibration.site import Site
 
+LONGER_S = 600.0
+"""Flows over 5 min are off by chance more than those over so long."""
 OBJECTIVE = (
     "sum of squares of measured minus simulated over the simulation's noise: breakdown time, "
-    "highest 5-minute flow before, discharge and the ramp's share of it, mean speed at each "
-    "detector before and after"
+    "highest 5-minute and 10-minute flow before, flow that comes in the 10 minutes before, "
+    "discharge and the ramp's share of it, mean speed at each detector before and after"
 )
 
 
@@ -18,6 +20,8 @@ def names_of_moments(site: Site) -> list[str]:
     return [
         "breakdown time (s)",
         "highest flow before (veh/h)",
+        "highest flow of 10 min before (veh/h)",
+        "flow that comes in the 10 min before (veh/h)",
         "discharge (veh/h)",
         "ramp's share of the discharge",
         *(f"speed at {loop.id} before (m/s)" for loop in site.loops),
@@ -28,9 +32,10 @@ def names_of_moments(site: Site) -> list[str]:
 def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
     """Returns numbers of what detectors told, nan for each that it does not tell.
 
-    When the merge broke down, the end where it did not; the highest flow of 5 min before; the mean
-    flow from the first full interval of the queue on, and the share of it that came by the ramp;
-    then at each detector the mean speed of vehicles before the breakdown, and from it on.
+    When the merge broke down, the end where it did not; the highest flow of 5 min before, that of
+    any 10 min before, and the flow that came to the merge in the last 10 min before; the mean flow
+    from the first full interval of the queue on, and the share of it that came by the ramp; then at
+    each detector the mean speed of vehicles before the breakdown, and from it on.
     """
     coarse = series.coarse()
     start = breakdown_of(coarse, site.upstream.id, free_mps)
@@ -43,16 +48,29 @@ def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
         after[start] = False
     ramp = coarse.vehicles[site.ramp_entry.id]
     both = ramp + coarse.vehicles[site.mainline_entry.id]
+    onset = onset_s(series, site, free_mps)
     return np.array(
         [
-            onset_s(series, site, free_mps),
+            onset,
             flow_veh_h[before].max() if before.any() else np.nan,
+            *_flows_before(series.between(series.begin_s, onset), site),
             flow_veh_h[after].mean() if after.any() else np.nan,
             ramp[after].sum() / both[after].sum() if after.any() and both[after].sum() else np.nan,
             *(_speed_mps(coarse, loop.id, before) for loop in site.loops),
             *(_speed_mps(coarse, loop.id, after) for loop in site.loops),
         ]
     )
+
+
+def _flows_before(series: Series, site: Site) -> tuple[float, float]:
+    """The highest flow of 10 min that left, and that of the last 10 min that came (veh/h)."""
+    together = max(1, round(LONGER_S / series.interval_s))
+    if series.intervals < together:
+        return np.nan, np.nan
+    left = series.flow_veh_h(site.downstream.id)
+    came = series.flow_veh_h(site.upstream.id) + series.flow_veh_h(site.ramp_entry.id)
+    means = np.convolve(left, np.full(together, 1.0 / together), "valid")
+    return float(means.max()), float(came[-together:].mean())
 
 
 def onset_s(series: Series, site: Site, free_mps: float) -> float:

@@ -25,7 +25,7 @@ RIDGE = 1e-2
 """Weight against steep functions, in units of one run's: it decides what runs leave open."""
 MOST = 9.0
 """No number counts for more than three times its noise, so that none that cannot fit rules."""
-USUAL_WITHIN = 0.25
+USUAL_WITHIN = 0.35
 """The share of its range by which a parameter may well differ from its usual value."""
 SHRUNK = 0.3
 """By how much correlations of noise are taken to be less than they seem: runs are few."""
@@ -62,12 +62,27 @@ class Round:
     reach: float
 
 
+def rounds_of(runs: int, parts: Sequence[tuple[float, float, float]]) -> list[Round]:
+    """Returns rounds from each one's share of all runs, its half width and its reach."""
+    until = np.rint(runs * np.cumsum([share for share, _, _ in parts])).astype(int)
+    counts = np.diff(until, prepend=0).tolist()
+    return [Round(count, *rest) for count, (_, *rest) in zip(counts, parts, strict=True)]
+
+
 @dataclass(frozen=True)
 class Runs:
     """Runs made: places in the unit cube, one row each, and the numbers that they gave."""
 
     places: FloatArray
     numbers: FloatArray
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The numbers that were measured, as means over so many ``times`` at which they were."""
+
+    numbers: FloatArray
+    times: int = 1
 
 
 @dataclass(frozen=True)
@@ -145,18 +160,19 @@ def _correlation(residuals: FloatArray, weight: FloatArray) -> FloatArray:
 
 
 def costs(
-    surrogate: Surrogate, measured: FloatArray, usual: FloatArray, places: FloatArray
+    surrogate: Surrogate, wanted: Wanted, usual: FloatArray, places: FloatArray
 ) -> FloatArray:
     """Returns at places how far the numbers are from those measured, in squares of their noise.
 
     ``usual`` is the usual place, nan for each parameter that has none.
     """
+    measured = wanted.numbers
     counted = counted_of(surrogate, measured)
     off = (surrogate.means(places) - measured)[:, counted] / surrogate.noise[counted]
     values, vectors = np.linalg.eigh(surrogate.correlation[np.ix_(counted, counted)])
     squares = (off @ vectors) ** 2 / np.maximum(values, 0.5 * SHRUNK)
     aside = np.nansum(((places - usual) / USUAL_WITHIN) ** 2, 1)
-    return np.asarray(np.minimum(MOST, squares).sum(1) + aside)
+    return np.asarray(wanted.times * np.minimum(MOST, squares).sum(1) + aside)
 
 
 def counted_of(surrogate: Surrogate, measured: FloatArray) -> BoolArray:
@@ -168,17 +184,17 @@ def search(
     axes: Sequence[Axis],
     rounds: Sequence[Round],
     simulate: Callable[[FloatArray], FloatArray],
-    measured: FloatArray,
+    wanted: Wanted,
     floor: FloatArray,
 ) -> tuple[FloatArray, Surrogate, Runs]:
-    """Returns the place in the unit cube whose runs are nearest to what was measured.
+    """Returns the place in the unit cube whose runs are nearest to what is wanted.
 
     ``simulate`` gives one row of numbers for each row of places. The surrogate and all runs come
     with it.
     """
     dimensions, usual = len(axes), np.array([axis.usual_share for axis in axes])
     centre = np.full(dimensions, 0.5)
-    places, numbers = np.empty((0, dimensions)), np.empty((0, len(measured)))
+    places, numbers = np.empty((0, dimensions)), np.empty((0, len(wanted.numbers)))
     for k, part in enumerate(rounds):
         drawn = qmc.LatinHypercube(dimensions, seed=k).random(part.runs)
         low = np.clip(centre - part.half_width, 0.0, 1.0)
@@ -188,9 +204,9 @@ def search(
         numbers = np.vstack([numbers, simulate(new)])
         runs = Runs(places, numbers)
         if k == 0:
-            centre = _nearest_runs(runs, measured, floor)
+            centre = _nearest_runs(runs, wanted.numbers, floor)
         surrogate = surrogate_of(runs, centre, part.reach, floor)
-        centre = _least(surrogate, measured, usual, part.half_width if k else part.reach)
+        centre = _least(surrogate, wanted, usual, part.half_width if k else part.reach)
     return centre, surrogate, runs
 
 
@@ -209,12 +225,12 @@ def _nearest_runs(runs: Runs, measured: FloatArray, floor: FloatArray) -> FloatA
 
 
 def _least(
-    surrogate: Surrogate, measured: FloatArray, usual: FloatArray, half_width: float
+    surrogate: Surrogate, wanted: Wanted, usual: FloatArray, half_width: float
 ) -> FloatArray:
     low = np.clip(surrogate.centre - half_width, 0.0, 1.0)
     high = np.clip(surrogate.centre + half_width, 0.0, 1.0)
     found = optimize.differential_evolution(
-        lambda columns: costs(surrogate, measured, usual, np.atleast_2d(columns.T)),
+        lambda columns: costs(surrogate, wanted, usual, np.atleast_2d(columns.T)),
         list(zip(low, high, strict=True)),
         seed=0,
         tol=1e-6,
