@@ -262,11 +262,7 @@ def _drive(
             continue
         answers = sites.handle([zone.view for zone in zones])
         plant.obey(
-            zones,
-            [
-                _with_breakdown(now_s, *found)
-                for found in zip(zones, answers, careless, strict=True)
-            ],
+            [_with_breakdown(now_s, *found) for found in zip(zones, answers, careless, strict=True)]
         )
     messages = () if sites is None else tuple(sites.counts())
     return _DrivenUntil(step * plant.step_s, most, messages)
@@ -284,6 +280,8 @@ def _let_happen(now_s: float, zone: ZoneUsers, careless: Careless) -> None:
 def _with_breakdown(
     now_s: float, zone: ZoneUsers, answer: SiteAnswer, careless: Careless
 ) -> SiteAnswer:
+    if not careless.is_needed:
+        return answer
     accel_mps2 = careless.with_breakdown(now_s, zone.view.users, answer.accel_mps2)
     return answer._replace(accel_mps2=accel_mps2)
 

@@ -1,6 +1,6 @@
 """The vehicles of a corridor in one SUMO session: who is in which zone, and how they are driven."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -9,45 +9,39 @@ import numpy as np
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.mixed.lanes import OUTERMOST, RAMP_LANE
 from coramp.mixed.users import RoadUsers
-from coramp.worlds.sumo.corridor_record import CorridorRecord
-from coramp.worlds.sumo.corridor_road import CorridorRoad, SiteRoad
+from coramp.worlds.sumo.corridor_look import (
+    Found,
+    Placed,
+    ZoneLanes,
+    ZoneLimits,
+    placed_of,
+    zone_lanes_of,
+    zone_limits_of,
+)
+from coramp.worlds.sumo.corridor_record import NO_SITE, CorridorRecord
+from coramp.worlds.sumo.corridor_road import CorridorRoad
 from coramp.worlds.sumo.corridor_sites import SiteAnswer, SiteView
 from coramp.worlds.sumo.mixed_lanes import LanedPlant
 
-NO_SITE = -1
 REFUSED_S = 1.0
 """So long SUMO may refuse a merge of a vehicle that stands, and that the law on board allows."""
-
-
-class Found(NamedTuple):
-    """Who is on the lanes of all zones, one entry each, by number."""
-
-    names: list[str]
-    lanes: list[str]
-    number: IntArray
-    position_m: FloatArray
-    speed_mps: FloatArray
-
-
-class Placed(NamedTuple):
-    """Who of those found is on a site's lanes: their places among all, stations and lanes.
-
-    ``inside`` is who is in the zone; the others are those ahead of it.
-    """
-
-    place: IntArray
-    station_m: FloatArray
-    lane: IntArray
-    beside: BoolArray
-    inside: BoolArray
+NEVER = -1
 
 
 @dataclass
 class ZoneUsers:
-    """Who a site's coordinator is told of, and who of them it commands."""
+    """Who a site's coordinator is told of."""
+
+    names: Sequence[str]
+    view: SiteView
+
+
+class Whole(NamedTuple):
+    """All that the coordinators of a moment are told of, site by site."""
 
     names: list[str]
-    view: SiteView
+    users: RoadUsers
+    lane: IntArray
     inside: BoolArray
 
 
@@ -57,173 +51,169 @@ class CorridorPlant(LanedPlant):
 
     A vehicle is commanded in the zone of one site at a time. Where it leaves the zone it is handed
     over: SUMO drives it, at the gaps that automated vehicles keep, until it enters the next.
-    Only those on the lanes of zones are looked at.
+    Only those on the lanes of zones are looked at. Of all others, those that have left among them,
+    some numbers each are kept, in arrays.
     """
 
     corridor: CorridorRoad | None = None
     record: CorridorRecord = field(default_factory=lambda: CorridorRecord(0, 1.0))
     commands: bool = True
-    _held: dict[int, tuple[str, int]] = field(default_factory=dict)
-    _from_ramp: set[int] = field(default_factory=set)
+    _zone_lanes: ZoneLanes = field(init=False)
+    _zone_limits: ZoneLimits = field(init=False)
+    _whole: Whole = field(init=False)
+    _held: dict[int, str] = field(default_factory=dict)
+    _held_at: IntArray = field(init=False)
+    _from_ramp: BoolArray = field(init=False)
     _refused: dict[int, int] = field(default_factory=dict)
-    _seen: set[int] = field(default_factory=set)
+    _seen_at: IntArray = field(init=False)
+    _looks: int = 0
 
-    @property
-    def _sites(self) -> tuple[SiteRoad, ...]:
+    def __post_init__(self) -> None:
+        """Nobody has been seen, or is held, in any zone."""
+        super().__post_init__()
         assert self.corridor is not None
-        return self.corridor.sites
+        sites, count = self.corridor.sites, len(self.able.automated)
+        self._zone_lanes = zone_lanes_of(sites, self.corridor.lanes)
+        self._zone_limits = zone_limits_of(sites)
+        self._held_at, self._seen_at = np.full(count, NO_SITE), np.full(count, NEVER)
+        self._from_ramp = np.zeros(count, np.bool_)
 
     def look(self, now_s: float) -> list[ZoneUsers]:
         """Returns who is in or just ahead of each zone, and takes back who has left one."""
         found = self._found()
-        placed = [_placed(own, found) for own in self._sites]
-        site = np.full(len(found.number), NO_SITE)
-        for k, own in enumerate(placed):
-            site[own.place[own.inside]] = k
+        placed = placed_of(self._zone_lanes, self._zone_limits, found)
         station_m = self._stations_sent_to(found, placed)
         self._forget_who_is_new(found.number)
-        speed_mps, accel_mps2 = self._measured(found.number, station_m, found.speed_mps.tolist())
-        self._note(now_s, found, placed, speed_mps)
-        self._hand_over(now_s, found, placed, site, speed_mps)
-        return [
-            self._zone_users(now_s, k, found, placed[k], speed_mps, accel_mps2)
-            for k in range(len(placed))
-        ]
+        speed_mps, accel_mps2 = self._measured(found.number, station_m, found.speed_mps)
+        self._note(now_s, found, placed, speed_mps[placed.place])
+        if self.commands:
+            self._release(now_s, found, placed, speed_mps)
+            self._take_over(now_s, found, placed, speed_mps)
+        return self._zone_users(now_s, found, placed, speed_mps, accel_mps2)
 
     def _found(self) -> Found:
         """Who is on the lanes of all zones, by number, so that their order is always the same."""
         assert self.corridor is not None
-        names, lanes, position_m, speed_mps = self.session.on_lanes(self.corridor.lanes)
-        number = np.array([self.able.number[name] for name in names], np.int64)
+        names, count_on, position_m, speed_mps = self.session.on_lanes(self.corridor.lanes)
+        number_of = self.able.number
+        number = np.array([number_of[name] for name in names], np.int64)
         order = np.argsort(number)
-        self._sumo_lane = {
-            name: int(lane.rpartition("_")[2]) for name, lane in zip(names, lanes, strict=True)
-        }
         return Found(
             [names[i] for i in order.tolist()],
-            [lanes[i] for i in order.tolist()],
             number[order],
+            np.repeat(np.arange(len(count_on)), count_on)[order],
             np.array(position_m, np.float64)[order],
             np.array(speed_mps, np.float64)[order],
         )
 
-    def _stations_sent_to(self, found: Found, placed: Sequence[Placed]) -> FloatArray:
+    def _stations_sent_to(self, found: Found, placed: Placed) -> FloatArray:
         """Stations of who is commanded, in its zone; others are nan, and were sent nowhere."""
-        held = np.array(
-            [self._held.get(n, ("", NO_SITE))[1] for n in found.number.tolist()], np.int64
-        )
         station_m = np.full(len(found.number), np.nan)
-        for k, own in enumerate(placed):
-            of_site = held[own.place] == k
-            station_m[own.place[of_site]] = own.station_m[of_site]
+        held = self._held_at[found.number[placed.place]] == placed.site
+        station_m[placed.place[held]] = placed.station_m[held]
         self._motion.sent_mps[found.number[np.isnan(station_m)]] = np.nan
         return station_m
 
     def _forget_who_is_new(self, number: IntArray) -> None:
         """Of who was not seen a period ago no acceleration is known."""
-        here = set(number.tolist())
-        new = np.array(sorted(here - self._seen), np.int64)
+        new = number[self._seen_at[number] != self._looks]
         self._motion.was_mps[new], self._motion.accel_mps2[new] = np.nan, 0.0
-        self._seen = here
+        self._looks += 1
+        self._seen_at[number] = self._looks
 
-    def _note(
-        self, now_s: float, found: Found, placed: Sequence[Placed], speed_mps: FloatArray
-    ) -> None:
+    def _note(self, now_s: float, found: Found, placed: Placed, speed_mps: FloatArray) -> None:
         """Notes who has left a zone, and who is in one."""
-        for k, own in enumerate(placed):
-            zone = self._sites[k].zone
-            number = found.number[own.place]
-            station_of = dict(zip(number.tolist(), own.station_m.tolist(), strict=True))
-            still = set(number[own.inside].tolist())
-            for n in sorted(self.record.inside(k) - still):
-                self.record.leave(now_s, k, n, station_of.get(n, zone.to_m) - zone.to_m)
-            lane = own.lane[own.inside]
-            start_m = np.where(lane == RAMP_LANE, zone.ramp_from_m, zone.from_m)
-            self.record.look(
-                now_s,
-                k,
-                number[own.inside],
-                lane,
-                speed_mps[own.place[own.inside]],
-                own.station_m[own.inside] - start_m,
-            )
+        inside, number = placed.inside, found.number[placed.place]
+        site, number_inside = placed.site[inside], number[inside]
+        for n, k in self.record.gone(site, number_inside):
+            own = placed.of_site(k)
+            there = placed.station_m[own][number[own] == n]
+            beyond_m = float(there[0]) - self._zone_lanes.to_m[k] if len(there) else 0.0
+            self.record.leave(now_s, k, n, beyond_m)
+        self.record.look(
+            now_s,
+            site,
+            number_inside,
+            placed.lane[inside],
+            speed_mps[inside],
+            placed.beyond_start_m[inside],
+        )
 
-    def _hand_over(
-        self,
-        now_s: float,
-        found: Found,
-        placed: Sequence[Placed],
-        site: IntArray,
-        speed_mps: FloatArray,
-    ) -> None:
-        """Leaves to SUMO who has left its zone, and notes who enters one."""
-        if not self.commands:
-            return
-        index = {n: i for i, n in enumerate(found.number.tolist())}
-        for n, (name, k) in list(self._held.items()):
-            i = index.get(n)
-            if i is not None and site[i] == k:
-                continue
-            del self._held[n]
-            self._changing.discard(n)
-            self._from_ramp.discard(n)
+    def _release(self, now_s: float, found: Found, placed: Placed, speed_mps: FloatArray) -> None:
+        """Leaves to SUMO who has left its zone."""
+        held = np.fromiter(self._held, np.int64, len(self._held))
+        for n in held[self.record.site_of(held) != self._held_at[held]].tolist():
+            k, name = int(self._held_at[n]), self._held.pop(n)
+            self._refused.pop(n, None)
+            self._held_at[n] = NO_SITE
+            self._changing[n] = self._from_ramp[n] = False
             self._motion.sent_mps[n] = self._motion.sent_m[n] = np.nan
-            if i is None:
+            if self._seen_at[n] != self._looks:
                 self.session.release(name)  # beyond what is seen, or out of the network
                 self.record.hand_over(now_s, n, k, False, (np.nan, np.nan, np.nan))
                 continue
             self.session.release_here(name)
-            place = _place_in(placed[k], i)
-            self.record.hand_over(now_s, n, k, False, (*place, float(speed_mps[i])))
-        for k, own in enumerate(placed):
-            for j in np.flatnonzero(own.inside).tolist():
-                i = int(own.place[j])
-                n = int(found.number[i])
-                if self.able.automated[n] and n not in self._held:
-                    self._held[n] = (found.names[i], k)
-                    self.actuators.begin(n)
-                    if own.lane[j] == RAMP_LANE:
-                        self._from_ramp.add(n)
-                    place = float(own.station_m[j]), float(own.lane[j])
-                    self.record.hand_over(now_s, n, k, True, (*place, float(speed_mps[i])))
+            i = int(np.searchsorted(found.number, n))
+            entry = placed.entry_of(k, i)
+            at = (np.nan, np.nan)
+            if entry is not None:
+                at = (float(placed.station_m[entry]), float(placed.lane[entry]))
+            self.record.hand_over(now_s, n, k, False, (*at, float(speed_mps[i])))
+
+    def _take_over(self, now_s: float, found: Found, placed: Placed, speed_mps: FloatArray) -> None:
+        """Notes who enters a zone, and is commanded from now on."""
+        number = found.number[placed.place]
+        enters = placed.inside & self.able.automated[number] & (self._held_at[number] == NO_SITE)
+        for entry in np.flatnonzero(enters).tolist():
+            i, n, k = int(placed.place[entry]), int(number[entry]), int(placed.site[entry])
+            self._held[n] = found.names[i]
+            self._held_at[n] = k
+            self.actuators.begin(n)
+            self._from_ramp[n] = placed.lane[entry] == RAMP_LANE
+            at = float(placed.station_m[entry]), float(placed.lane[entry])
+            self.record.hand_over(now_s, n, k, True, (*at, float(speed_mps[i])))
 
     def _zone_users(
         self,
         now_s: float,
-        k: int,
         found: Found,
-        own: Placed,
+        placed: Placed,
         speed_mps: FloatArray,
         accel_mps2: FloatArray,
-    ) -> ZoneUsers:
-        number, able = found.number[own.place], self.able
-        allowed_mps = self._limits_at(self._sites[k], own)
+    ) -> list[ZoneUsers]:
+        """What each site's coordinator is told: parts of arrays of them all."""
+        place, able = placed.place, self.able
+        number = found.number[place]
         users = RoadUsers(
             number,
-            own.station_m,
-            speed_mps[own.place],
-            accel_mps2[own.place],
+            placed.station_m,
+            speed_mps[place],
+            accel_mps2[place],
             able.length_m[number],
-            own.lane > RAMP_LANE,
+            placed.lane > RAMP_LANE,
             able.automated[number],
-            np.minimum(able.cruise_mps[number], allowed_mps),
+            np.minimum(able.cruise_mps[number], placed.allowed_mps),
             able.acceleration_mps2[number],
             able.power_wpkg[number],
             able.braking_mps2[number],
         )
-        may_leave = own.beside & (own.lane == RAMP_LANE) & own.inside
-        view = SiteView(now_s, users, own.lane, own.beside, may_leave, self.ahead(users))
-        return ZoneUsers([found.names[i] for i in own.place.tolist()], view, own.inside)
-
-    def _limits_at(self, site: SiteRoad, own: Placed) -> FloatArray:
-        """What the limits of each one's road let it drive."""
-        return np.array(
-            [
-                site.limits(lane == RAMP_LANE).allowed_mps(at_m)
-                for lane, at_m in zip(own.lane.tolist(), own.station_m.tolist(), strict=True)
-            ],
-            np.float64,
-        )
+        names = [found.names[i] for i in place.tolist()]
+        self._whole = Whole(names, users, placed.lane, placed.inside)
+        may_leave = placed.beside & (placed.lane == RAMP_LANE) & placed.inside
+        ahead = self.ahead(users)
+        zones = []
+        for k in range(len(placed.first) - 1):
+            own = placed.of_site(k)
+            view = SiteView(
+                now_s,
+                RoadUsers._make([column[own] for column in users]),
+                placed.lane[own],
+                placed.beside[own],
+                may_leave[own],
+                ahead._replace(way_m=ahead.way_m[own], speed_mps=ahead.speed_mps[own]),
+            )
+            zones.append(ZoneUsers(names[own], view))
+        return zones
 
     def _settle(self, names: Sequence[str], users: RoadUsers) -> None:
         """Has SUMO judge gaps as usual for who has come from the ramp onto the mainline.
@@ -231,14 +221,13 @@ class CorridorPlant(LanedPlant):
         Where the mainline is empty far and wide SUMO changes lanes by itself, without a command.
         On the ramp SUMO finds no gap for a vehicle, and nobody could change in before it.
         """
-        if not self._from_ramp:
-            return
-        for i in np.flatnonzero(users.on_mainline & users.automated).tolist():
-            if int(users.number[i]) in self._from_ramp:
-                self._from_ramp.discard(int(users.number[i]))
-                self._refused.pop(int(users.number[i]), None)
-                self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
-                self.session.take_over(names[i])
+        came = users.on_mainline & users.automated & self._from_ramp[users.number]
+        for i in np.flatnonzero(came).tolist():
+            n = int(users.number[i])
+            self._from_ramp[n] = False
+            self._refused.pop(n, None)
+            self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
+            self.session.take_over(names[i])
 
     def _change_lane(self, name: str) -> None:
         """Has a vehicle change to the next lane further in, as SUMO allows.
@@ -247,58 +236,20 @@ class CorridorPlant(LanedPlant):
         the law on board allows, neither would ever go on: then it changes without SUMO's check.
         """
         number = self.able.number[name]
-        if number in self._from_ramp and self._motion.sent_mps[number] == 0.0:
+        if self._from_ramp[number] and self._motion.sent_mps[number] == 0.0:
             tried = self._refused[number] = self._refused.get(number, 0) + 1
             if tried * self.period_s > REFUSED_S:
-                lane = self._sumo_lane[name] + 1
-                self.session.change_lane_now(name, lane, self.period_steps)
+                self.session.change_lane_now(name, self.period_steps)
                 return
         super()._change_lane(name)
 
-    def obey(self, zones: Sequence[ZoneUsers], answers: Sequence[SiteAnswer]) -> None:
+    def obey(self, answers: Sequence[SiteAnswer]) -> None:
         """Has the automated vehicles of all zones do what their coordinators answer."""
-        names: list[str] = []
-        for zone in zones:
-            names += [name for name, own in zip(zone.names, zone.inside, strict=True) if own]
-        users = RoadUsers._make(
-            np.concatenate(columns)
-            for columns in zip(*(_inside_of(zone) for zone in zones), strict=True)
-        )
-        changes = np.concatenate(
-            [answer.changes[zone.inside] for zone, answer in zip(zones, answers, strict=True)]
-        )
-        accel_mps2 = np.concatenate(
-            [answer.accel_mps2[zone.inside] for zone, answer in zip(zones, answers, strict=True)]
-        )
-        lane = np.concatenate([zone.view.lane[zone.inside] for zone in zones])
+        whole, inside = self._whole, self._whole.inside
+        names = [whole.names[i] for i in np.flatnonzero(inside).tolist()]
+        users = RoadUsers._make([column[inside] for column in whole.users])
+        changes = np.concatenate([answer.changes for answer in answers])[inside]
+        accel_mps2 = np.concatenate([answer.accel_mps2 for answer in answers])[inside]
         self._settle(names, users)
-        self.record.change(users.number[changes & (lane >= OUTERMOST)].tolist())
+        self.record.change(users.number[changes & (whole.lane[inside] >= OUTERMOST)].tolist())
         self.command(names, users, accel_mps2, changes)
-
-
-def _inside_of(zone: ZoneUsers) -> Iterator[FloatArray | IntArray | BoolArray]:
-    return (column[zone.inside] for column in zone.view.users)
-
-
-def _placed(site: SiteRoad, found: Found) -> Placed:
-    """Who is on a site's lanes, in the zone or just ahead of it."""
-    spans = site.lanes
-    place = np.array([i for i, lane in enumerate(found.lanes) if lane in spans], np.int64)
-    own = [spans[found.lanes[i]] for i in place.tolist()]
-    start_m = np.array([span.start_m for span in own], np.float64)
-    per_m = np.array([span.per_m for span in own], np.float64)
-    station_m = start_m + found.position_m[place] * per_m
-    lane = np.array([span.lane for span in own], np.int64)
-    beside = np.array([span.changes for span in own], np.bool_)
-    from_m = np.where(lane == RAMP_LANE, site.zone.ramp_from_m, site.zone.from_m)
-    seen = (station_m >= from_m) & (station_m < site.zone.sees_m)
-    inside = station_m < site.zone.to_m
-    return Placed(place[seen], station_m[seen], lane[seen], beside[seen], inside[seen])
-
-
-def _place_in(own: Placed, place: int) -> tuple[float, float]:
-    """The station and lane of one of those found on a site's lanes; nan where it is not there."""
-    there = np.flatnonzero(own.place == place)
-    if len(there) == 0:
-        return np.nan, np.nan
-    return float(own.station_m[there[0]]), float(own.lane[there[0]])

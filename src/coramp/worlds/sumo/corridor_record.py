@@ -14,6 +14,7 @@ from coramp.worlds.sumo.network import RAMP_LANE
 
 HARD_MPS2 = 3.0
 STOPPED_MPS = 0.1
+NO_SITE = -1
 PASSAGE = (
     "site", "number", "on_ramp", "entered_s", "left_s", "merged_s", "hard_brakings", "stopped",
     "changes",
@@ -32,7 +33,10 @@ class CorridorRecord:
     period_s: float
     passages: "array[float]" = field(default_factory=lambda: array("d"))
     hand_overs: "array[float]" = field(default_factory=lambda: array("d"))
-    _inside: list[set[int]] = field(default_factory=list)
+    _inside: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    _inside_at: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    _site: IntArray = field(init=False)
+    _next_site: IntArray = field(init=False)
     _entered_s: FloatArray = field(init=False)
     _merged_s: FloatArray = field(init=False)
     _was_mps: FloatArray = field(init=False)
@@ -45,6 +49,7 @@ class CorridorRecord:
     def __post_init__(self) -> None:
         """Nobody is in any zone yet."""
         count = self.count
+        self._site, self._next_site = np.full(count, NO_SITE), np.full(count, NO_SITE)
         self._entered_s, self._merged_s = np.full(count, np.nan), np.full(count, np.nan)
         self._was_mps = np.full(count, np.nan)
         self._on_ramp, self._braking = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
@@ -54,19 +59,22 @@ class CorridorRecord:
     def look(
         self,
         now_s: float,
-        site: int,
+        site: IntArray,
         number: IntArray,
         lane: IntArray,
         speed_mps: FloatArray,
         beyond_start_m: FloatArray,
     ) -> None:
-        """Notes who is in a site's zone; ``beyond_start_m`` is how far each is beyond its start."""
-        while len(self._inside) <= site:
-            self._inside.append(set())
-        inside = self._inside[site]
-        new = np.array([n not in inside for n in number.tolist()], np.bool_)
+        """Notes who is in which zone now; ``beyond_start_m`` is how far each is beyond its start.
+
+        Vehicles are in the order of sites, and of numbers in each zone. Of those that have
+        ``gone``, it must have been noted that they ``leave``.
+        """
+        new = self._site[number] != site
         self._enter(now_s, number[new], lane[new], speed_mps[new], beyond_start_m[new])
-        inside.update(number[new].tolist())
+        self._site[self._inside] = NO_SITE
+        self._site[number] = site
+        self._inside, self._inside_at = number, site
         since_mps = speed_mps - self._was_mps[number]
         hard = since_mps < -HARD_MPS2 * self.period_s
         self._hard[number] += hard & ~self._braking[number]
@@ -91,14 +99,24 @@ class CorridorRecord:
         self._braking[number] = self._stopped[number] = False
         self._hard[number] = self._changes[number] = 0
 
-    def inside(self, site: int) -> set[int]:
-        """Returns who was in a site's zone at the last look."""
-        return self._inside[site] if site < len(self._inside) else set()
+    def gone(self, site: IntArray, number: IntArray) -> list[tuple[int, int]]:
+        """Returns who was in a zone at the last look, and is not in it now: numbers and sites.
+
+        ``number`` and ``site`` are who is in which zone now.
+        """
+        now = self._next_site
+        now[number] = site
+        left = now[self._inside] != self._inside_at
+        now[number] = NO_SITE
+        return list(zip(self._inside[left].tolist(), self._inside_at[left].tolist(), strict=True))
+
+    def site_of(self, number: IntArray) -> IntArray:
+        """Returns in which zone these vehicles were at the last look, ``NO_SITE`` for none."""
+        return np.asarray(self._site[number])
 
     def leave(self, now_s: float, site: int, number: int, beyond_end_m: float) -> None:
         """Notes that a vehicle has left a zone, and how far (m) it is beyond the zone's end."""
         ago_s = beyond_end_m / max(self._was_mps[number], STOPPED_MPS)
-        self._inside[site].discard(number)
         self._add(site, number, now_s - min(max(ago_s, 0.0), self.period_s))
 
     def change(self, number: Sequence[int]) -> None:
@@ -113,10 +131,9 @@ class CorridorRecord:
 
     def end(self) -> None:
         """Notes who is still in a zone at the end of a run; that it left is not known."""
-        for site, inside in enumerate(self._inside):
-            for number in sorted(inside):
-                self._add(site, number, np.nan)
-            inside.clear()
+        for number, site in zip(self._inside.tolist(), self._inside_at.tolist(), strict=True):
+            self._add(site, number, np.nan)
+        self._inside, self._inside_at = self._inside[:0], self._inside_at[:0]
 
     def _add(self, site: int, number: int, left_s: float) -> None:
         self.passages.extend(

@@ -114,7 +114,8 @@ class Moment(NamedTuple):
 
     ``able`` is who is on the acceleration lane and can leave it. ``steering`` has one entry for
     each of those ``seen``, and is None where nobody automated is on the road, or nobody is seen.
-    ``around`` is who is around whom of ``users``, None where nobody has looked yet.
+    ``around`` is who is around whom of ``users``, None where nobody has looked yet. ``outer`` is
+    who of them the strategy may command, where that is not all.
     """
 
     now_s: float
@@ -124,6 +125,7 @@ class Moment(NamedTuple):
     seen: RoadUsers
     steering: Steering | None
     around: Neighbours | None = None
+    outer: RoadUsers | None = None
 
 
 class Driven(NamedTuple):

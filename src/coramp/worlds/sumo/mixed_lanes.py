@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.mixed.lanes import OUTERMOST, RAMP_LANE, Lanes, decided_in_lanes, on_endless_lanes
+from coramp.mixed.laws import OnBoardLaws
 from coramp.mixed.on_board import Ahead
 from coramp.mixed.users import RoadUsers
 from coramp.networks.limits import SLOWS_MPS2, Limits
@@ -34,7 +36,6 @@ class LanedPlant(MixedPlant):
     lane: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     beside: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
     _table: "_Table | None" = None
-    _sumo_lane: dict[str, int] = field(default_factory=dict)
 
     def is_on(self, road: LanedRoad) -> None:
         """Is told its road."""
@@ -51,7 +52,6 @@ class LanedPlant(MixedPlant):
         station_m = table.start_m[place] + np.array(position_m) * table.per_m[place]
         speed_mps, accel_mps2 = self._measured(number, station_m, sumo_mps)
         self.lane = table.lane[place]
-        self._sumo_lane = dict(zip(names, table.sumo_lane[place].tolist(), strict=True))
         users = RoadUsers(
             number,
             station_m,
@@ -81,7 +81,7 @@ class LanedPlant(MixedPlant):
     def _change_lane(self, name: str) -> None:
         """Has a vehicle change to the next lane further in; SUMO refuses what would collide."""
         time_s = (self.period_steps - 1) * self.step_s
-        self.session.change_lane_if_clear(name, self._sumo_lane[name] + 1, max(time_s, self.step_s))
+        self.session.change_lane_if_clear(name, max(time_s, self.step_s))
 
 
 class _Table(NamedTuple):
@@ -92,7 +92,6 @@ class _Table(NamedTuple):
     end_m: FloatArray
     per_m: FloatArray
     lane: IntArray
-    sumo_lane: IntArray
     changes: BoolArray
 
     @classmethod
@@ -104,7 +103,6 @@ class _Table(NamedTuple):
             np.array([span.end_m for span in spans], np.float64),
             np.array([span.per_m for span in spans], np.float64),
             np.array([span.lane for span in spans], np.int64),
-            np.array([int(name.rpartition("_")[2]) for name in lanes], np.int64),
             np.array([span.changes for span in spans], np.bool_),
         )
 
@@ -147,7 +145,11 @@ class LanedControl(Control):
         """Returns what the strategy answers to what it has heard of the outer lanes."""
         outer = _chosen(users, self._lane <= OUTERMOST)
         moment = super().decided(now_s, names, able, outer)
-        return moment._replace(users=users, around=None)
+        return moment._replace(users=users, around=None, outer=outer)
+
+    @cached_property
+    def _endless(self) -> OnBoardLaws:
+        return on_endless_lanes(self.laws)
 
     @property
     def _lane(self) -> IntArray:
@@ -161,12 +163,12 @@ class LanedControl(Control):
 
     def driven(self, moment: Moment, plant: Foresees) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board."""
-        users, laws = moment.users, self.laws
+        users, laws, endless = moment.users, self.laws, self._endless
         most_mps2, may_merge = self._told(moment, self._lane)
         lanes = Lanes(self._lane, self._beside)
         wishes = may_merge & moment.able & users.automated & (lanes.number == RAMP_LANE)
         obeys_mps2, accel_mps2, changes = decided_in_lanes(
-            users, lanes, plant.ahead(users), most_mps2, wishes, laws, on_endless_lanes(laws)
+            users, lanes, plant.ahead(users), most_mps2, wishes, laws, endless
         )
         return Driven(obeys_mps2, wishes, accel_mps2, changes)
 
@@ -176,7 +178,7 @@ class LanedControl(Control):
         if moment.steering is not None:
             self.air.tell(moment.now_s, moment.seen, moment.steering)
         most_mps2, may_merge = np.full(len(lane), np.inf), np.zeros(len(lane), np.bool_)
-        own = _chosen(users, outer)
+        own = _chosen(users, outer) if moment.outer is None else moment.outer
         most_mps2[outer], may_merge[outer] = self.air.told(moment.now_s, own)
         if self.notes is not None:
             self.notes.told(moment.now_s, own, moment.seen, most_mps2[outer], self.air)

@@ -53,7 +53,7 @@ class MixedPlant:
     min_gap_m: float
     actuators: SlowActuators
     _motion: Motion = field(init=False)
-    _changing: set[int] = field(default_factory=set)
+    _changing: BoolArray = field(init=False)
     _lane_numbers: dict[str, int] = field(init=False)
     _starts_m: FloatArray = field(init=False)
     _on_mainline: BoolArray = field(init=False)
@@ -69,6 +69,7 @@ class MixedPlant:
             accel_mps2=np.zeros(count),
             largest_error_m=np.where(self.able.automated, 0.0, np.nan),
         )
+        self._changing = np.zeros(count, np.bool_)
         lanes = list(self.lane_starts_m)
         self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
         self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
@@ -112,7 +113,7 @@ class MixedPlant:
         return names, self._may_merge[lane], users
 
     def _measured(
-        self, number: IntArray, station_m: FloatArray, sumo_mps: Sequence[float]
+        self, number: IntArray, station_m: FloatArray, sumo_mps: Sequence[float] | FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Speeds (m/s) and accelerations (m/s2) of who is on the road now."""
         share = min(1.0, self.period_s / SMOOTHED_OVER_S)
@@ -138,15 +139,14 @@ class MixedPlant:
                 continue
             self.session.take_over_among_drivers(names[i])
             self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
-        if self._changing:
-            for i in own[users.on_mainline[own]].tolist():
-                if int(users.number[i]) in self._changing:
-                    self.session.take_over(names[i])
-                    self._changing.discard(int(users.number[i]))
+        changed = users.on_mainline[own] & self._changing[number]
+        for i in own[changed].tolist():
+            self.session.take_over(names[i])
+        self._changing[number[changed]] = False
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self._change_lane(names[i])
-            self._changing.add(int(users.number[i]))
+            self._changing[users.number[i]] = True
         chosen = [names[i] for i in own.tolist()]
         self._motion.sent_m[number] = users.station_m[own]
         self._motion.sent_mps[number] = users.speed_mps[own]
@@ -154,7 +154,7 @@ class MixedPlant:
 
     def _change_lane(self, name: str) -> None:
         """Has a vehicle on the acceleration lane change to the mainline beside it."""
-        self.session.change_lane_now(name, 1, self.period_steps)
+        self.session.change_lane_now(name, self.period_steps)
 
     def _drive(self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray) -> None:
         """Drives a period: at once with these accelerations, or step by step as the lag has it."""
@@ -174,4 +174,4 @@ class MixedPlant:
         self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray, steps: int
     ) -> None:
         from_mps, to_mps = sent_evenly(number, accel_mps2, self._motion, steps, self.step_s)
-        self.session.drive_evenly(names, from_mps.tolist(), to_mps.tolist(), steps)
+        self.session.drive_evenly(names, from_mps, to_mps, steps)

@@ -8,16 +8,22 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 from types import TracebackType
 from typing import Any, Self
 
 import libsumo as untyped_libsumo
+import numpy as np
+from libsumo import _libsumo as untyped_native
 
+from coramp._kernel import FloatArray
 from coramp.errors import CorampError
 from coramp.worlds.sumo.demand import FASTEST_COMMAND_MPS
 from coramp.worlds.sumo.network import sumo_binary
 
 libsumo: Any = untyped_libsumo
+native: Any = untyped_native
+"""libsumo's functions without the Python around each, for what is called for every vehicle."""
 
 OBEY = 32
 """Speed mode without any check: the vehicle does what it is told."""
@@ -183,8 +189,8 @@ class Session:
     def drive_evenly(
         self,
         vehicle_ids: Sequence[str],
-        before_mps: Sequence[float],
-        after_mps: Sequence[float],
+        before_mps: FloatArray,
+        after_mps: FloatArray,
         steps: int,
     ) -> None:
         """Commands even changes of speed over steps, from the speeds that the last step had.
@@ -193,53 +199,54 @@ class Session:
         v - a h / 2 and ``after_mps`` v + a (n - 1/2) h for n steps of h. Nobody is commanded if
         one of the speeds cannot be.
         """
-        for vehicle_id, before, after in zip(vehicle_ids, before_mps, after_mps, strict=True):
-            if not math.isfinite(before):
-                raise CorampError(f"SUMO: {vehicle_id}: a speed of {before} m/s cannot be")
-            _check_speed(vehicle_id, after)
-        set_previous, slow_down = libsumo.vehicle.setPreviousSpeed, libsumo.vehicle.slowDown
+        befores, afters = before_mps.tolist(), after_mps.tolist()
+        if not _all_can_be(before_mps, after_mps):
+            for vehicle_id, before, after in zip(vehicle_ids, befores, afters, strict=True):
+                if not math.isfinite(before):
+                    raise CorampError(f"SUMO: {vehicle_id}: a speed of {before} m/s cannot be")
+                _check_speed(vehicle_id, after)
+        set_previous, slow_down = native.vehicle_setPreviousSpeed, native.vehicle_slowDown
         time_s = steps * self._step_s
-        for vehicle_id, before, after in zip(vehicle_ids, before_mps, after_mps, strict=True):
+        for vehicle_id, before, after in zip(vehicle_ids, befores, afters, strict=True):
             set_previous(vehicle_id, before)
             slow_down(vehicle_id, after, time_s)
 
-    def change_lane_now(self, vehicle_id: str, lane: int, steps: int) -> None:
-        """Commands a lane change in the next step, without SUMO's checks."""
+    def change_lane_now(self, vehicle_id: str, steps: int) -> None:
+        """Commands a change to the next lane further in, in the next step, without checks."""
         libsumo.vehicle.setLaneChangeMode(vehicle_id, NO_CHANGES)
+        lane = libsumo.vehicle.getLaneIndex(vehicle_id) + 1
         libsumo.vehicle.changeLane(vehicle_id, lane, (steps + 1) * self._step_s)
 
-    def change_lane_if_clear(self, vehicle_id: str, lane: int, time_s: float) -> None:
-        """Commands a lane change within a time, but for one into another vehicle."""
+    def change_lane_if_clear(self, vehicle_id: str, time_s: float) -> None:
+        """Commands a change to the next lane further in, but for one into another vehicle."""
         libsumo.vehicle.setLaneChangeMode(vehicle_id, CLEAR_CHANGES)
+        lane = libsumo.vehicle.getLaneIndex(vehicle_id) + 1
         libsumo.vehicle.changeLane(vehicle_id, lane, time_s)
 
     def everyone(self) -> tuple[list[str], list[str], list[float], list[float]]:
         """Returns who is on the road: names, lanes, positions along them (m), speeds (m/s)."""
-        vehicle = libsumo.vehicle
-        names = list(vehicle.getIDList())
+        names = list(native.vehicle_getIDList())
         return (
             names,
-            list(map(vehicle.getLaneID, names)),
-            list(map(vehicle.getLanePosition, names)),
-            list(map(vehicle.getSpeed, names)),
+            list(map(native.vehicle_getLaneID, names)),
+            list(map(native.vehicle_getLanePosition, names)),
+            list(map(native.vehicle_getSpeed, names)),
         )
 
     def on_lanes(
         self, lanes: Iterable[str]
-    ) -> tuple[list[str], list[str], list[float], list[float]]:
-        """Returns who is on these lanes, as ``everyone`` does."""
-        names: list[str] = []
-        at: list[str] = []
-        for lane in lanes:
-            here = libsumo.lane.getLastStepVehicleIDs(lane)
-            names += here
-            at += [lane] * len(here)
-        vehicle = libsumo.vehicle
+    ) -> tuple[list[str], list[int], list[float], list[float]]:
+        """Returns who is on these lanes, lane by lane, and how many are on each.
+
+        Names, numbers by lane, positions along the lanes (m), speeds (m/s).
+        """
+        here = list(map(native.lane_getLastStepVehicleIDs, lanes))
+        names = list(chain.from_iterable(here))
         return (
             names,
-            at,
-            [vehicle.getLanePosition(name) for name in names],
-            [vehicle.getSpeed(name) for name in names],
+            list(map(len, here)),
+            list(map(native.vehicle_getLanePosition, names)),
+            list(map(native.vehicle_getSpeed, names)),
         )
 
     def keep_speed(self, vehicle_id: str, speed_mps: float) -> None:
@@ -325,6 +332,12 @@ def _stopping_effort(vehicle_id: str, at_m: float) -> float:
     left_m = at_m - float(libsumo.vehicle.getLanePosition(vehicle_id))
     braking_mps2 = float(libsumo.vehicle.getDecel(vehicle_id))
     return speed_mps**2 / (2.0 * left_m * braking_mps2) if left_m > 0.0 else math.inf
+
+
+def _all_can_be(before_mps: FloatArray, after_mps: FloatArray) -> bool:
+    """Whether speeds (m/s) before are finite, and those after can be commanded."""
+    finite = bool(np.isfinite(before_mps).all())
+    return finite and bool(((after_mps >= 0.0) & (after_mps <= FASTEST_COMMAND_MPS)).all())
 
 
 def _check_speed(vehicle_id: str, speed_mps: float) -> None:
