@@ -3,7 +3,7 @@
 from coramp.errors import CorampError
 from coramp.scenarios.corridors import Corridor
 from coramp.scenarios.model import Scenario
-from coramp.strategies.base import Strategy, is_metered
+from coramp.strategies.base import Strategy, coordinates_meters, is_metered
 from coramp.strategies.registry import strategies, strategy_named
 from coramp.worlds.sumo.metered_road import metering_problem, room_line
 
@@ -12,7 +12,7 @@ def check_metering(scenario: Scenario, strategy: type[Strategy], population: str
     """Raises CorampError for a ramp without room for a signal, and for a strategy of several."""
     if not is_metered(strategy):
         return
-    if getattr(strategy, "coordinates_meters", False):
+    if coordinates_meters(strategy):
         raise CorampError(
             f"strategy: {strategy.name} coordinates the meters of several ramps; allowed is a "
             "corridor of two or more, or alinea for one ramp"
@@ -35,7 +35,7 @@ def check_metered_corridor(corridor: Corridor, strategy: type[Strategy], populat
             f"{able}"
         )
     most = max(len(road.sites) for road in corridor.roads)
-    if getattr(strategy, "coordinates_meters", False) and most < 2:
+    if coordinates_meters(strategy) and most < 2:
         raise CorampError(
             f"strategy: {strategy.name} coordinates ramps one behind the other, and each road here "
             "has one; allowed is a corridor with two or more on a road, or alinea"

@@ -7,7 +7,7 @@ from typing import Any
 from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import TABLES
-from coramp.strategies.base import Strategy, steps_of_period
+from coramp.strategies.base import Strategy, coordinates_meters, steps_of_period
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
 from coramp.worlds.sumo.mixed_setup import safety_law_of
@@ -81,6 +81,8 @@ def _asked_for(scenario: Scenario) -> tuple[str, str]:
 
 
 def _among_drivers(strategy: type[Strategy]) -> bool:
+    if coordinates_meters(strategy):
+        return False  # at one merge site
     return not strategy.cooperative or coordinates_drivers(strategy)
 
 
