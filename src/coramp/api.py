@@ -28,6 +28,7 @@ from coramp.runs.corridors import (
     unserved_notice,
     write_corridor,
 )
+from coramp.runs.metering import room_lines
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
 from coramp.scenarios.loading import load_scenario
@@ -147,13 +148,17 @@ def corridor(
     """Runs a corridor once, each site with a coordinator of its own; writes to ``out`` if given.
 
     ``scenario`` is a file with ``[corridor]``. Coordinators run in this process, or in so many
-    ``processes`` of their own; the figures are the same. ``notice`` is told who is unserved.
-    Raises CorampError for what cannot be run and for a run that fails.
+    ``processes`` of their own; the figures are the same. ``notice`` is told who is unserved,
+    and what room metered ramps have. Raises CorampError for what cannot be run and for a run that
+    fails.
     """
     processes_checked(processes)
     spec = corridor_spec(scenario, strategy, drivers=drivers, overrides=overrides, seed=seed)
     if out is None and keep_sumo:
         raise CorampError("--keep-sumo: there is no folder to keep files in; give --out DIR")
+    if notice is not None:
+        for line in room_lines(spec.corridor, strategy, spec.drivers):
+            notice(line)
     if out is None:
         result = execute_corridor(spec, processes, SumoOptions(gui=gui))
     else:

@@ -47,6 +47,7 @@ def test_what_the_design_promises_is_built_in():
         "slots",
         "mixed-slots",
         "alinea",
+        "hero",
         "uncontrolled",
     ]
 

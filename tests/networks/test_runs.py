@@ -128,7 +128,10 @@ def test_the_kept_files_run_in_plain_sumo(tmp_path):
     ("options", "told"),
     [
         (("--strategy", "slots"), "slots cannot run where the road lies in a network"),
-        (("--strategy", "alinea"), "alinea cannot run where the road lies in a network"),
+        (
+            ("--strategy", "hero"),
+            "hero coordinates the meters of several ramps; allowed is a corridor of two or more",
+        ),
         (("--strategy", "mixed-slots", "--engine", "exact"), "exact cannot run where the road"),
         (("--set", "mainline.start_m=-500.0"), "-500 is not what 24498409@4054057 has"),
         (("--set", "mainline.lanes=2"), "mainline.lanes: 2 is not what"),

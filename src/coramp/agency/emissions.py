@@ -1,8 +1,8 @@
 """Fuel and CO2 by type of vehicle.
 
 A litre of petrol gives 2.348 kg of CO2, one of diesel 2.689 kg: 8,887 and 10,180 g a gallon (U.S.
-EPA, Greenhouse Gas Emissions from a Typical Passenger Vehicle, EPA-420-F-18-008). Cars burn petrol,
-heavy-duty vehicles diesel, as in the models of their fuel.
+EPA, Greenhouse Gas Emissions from a Typical Passenger Vehicle, EPA-420-F-18-008, March 2018). Cars
+burn petrol, heavy-duty vehicles diesel, as in the models of their fuel.
 """
 
 import numpy as np

@@ -1,10 +1,12 @@
-"""Level of service by density, as in the Highway Capacity Manual (6th edition).
+"""Level of service by density, as in the Highway Capacity Manual (6th edition 2016, 7th 2022).
 
 Densities count passenger cars per mile and lane: a heavy vehicle stands for two (Exhibit 12-25,
 level terrain). The letters of basic segments are those of Exhibit 12-15, those of merge influence
-areas, which reach 1,500 ft (457.2 m) downstream from where the ramp joins, of Exhibit 14-3. These
-have the acceleration lane and the two mainline lanes next to it (chapter 14), other segments all
-lanes. F is demand above capacity: here, intervals in which the merge is broken down.
+areas, which reach 1,500 ft (457.2 m) downstream from where the ramp joins (Exhibit 14-1), of
+Exhibit 14-3. These have the acceleration lane and the two mainline lanes next to it (chapter 14),
+other segments all lanes. F is demand above capacity: here, intervals in which the merge is broken
+down. Edition 7.1 (2025) has another chapter 14, whose letters (Exhibit 14-2) are not used here:
+A to E up to 11, 18, 25, 30 and 35 passenger cars per mile and lane, F above.
 """
 
 from typing import NamedTuple

@@ -10,6 +10,7 @@ from coramp.metrics.frames import frame_of
 from coramp.records.corridor_outcome import (
     HAND_OVERS,
     MESSAGES,
+    METERS,
     PASSAGES,
     SITES,
     TOTALS,
@@ -23,13 +24,16 @@ EVENTS = ("leaves", "enters")
 
 
 def corridor_tables(outcome: CorridorOutcome) -> dict[str, pl.DataFrame]:
-    """Returns the tables by the names of their files."""
-    return {
+    """Returns the tables by the names of their files; that of meters only where there are some."""
+    found = {
         "sites": _sites(outcome),
         "trips": _trips(outcome),
         "passages": _passages(outcome),
         "hand_overs": _hand_overs(outcome),
     }
+    if outcome.meters is not None:
+        found["meters"] = frame_of(METERS, **outcome.meters)
+    return found
 
 
 def totals_of(outcome: CorridorOutcome, sites: pl.DataFrame) -> Row:

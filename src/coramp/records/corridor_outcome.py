@@ -1,7 +1,8 @@
 """What happened on a corridor, as arrays; and the columns of its tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import polars as pl
 
@@ -68,13 +69,27 @@ HAND_OVERS: Schema = {
     "lane": pl.Int64,
     "speed_mps": pl.Float64,
 }
+METERS: Schema = {
+    "time_s": pl.Float64,
+    "site": pl.String,
+    "occupancy_percent": pl.Float64,
+    "queue_occupancy_percent": pl.Float64,
+    "arrivals_veh_h": pl.Float64,
+    "queue_veh": pl.Int64,
+    "room_veh": pl.Float64,
+    "rate_veh_h": pl.Float64,
+    "let_go": pl.Boolean,
+    "role": pl.String,
+    "master": pl.String,
+}
 CORRIDOR_FILES: Mapping[str, Schema] = {
     "sites": SITES,
     "trips": TRIPS,
     "passages": PASSAGES,
     "hand_overs": HAND_OVERS,
+    "meters": METERS,
 }
-"""The tables of a corridor's run by the names of their files."""
+"""The tables of a corridor's run by the names of their files; the last where ramps are metered."""
 TOTALS = (
     "vehicles", "through", "unserved", "time_spent_s", "waiting_s", "delay_s", "mean_delay_s",
     "vehicle_km", "merges", "made_way", "hard_brakings_3", "stopped_vehicles", "hand_overs",
@@ -92,7 +107,7 @@ class CorridorOutcome:
     did), how long it waited to enter, drove and lost against its wish, and how far it went.
     ``collided`` are time (s), rear and front vehicle of each pair. ``messages`` has one entry a
     site; it is empty where nobody coordinates. ``most_at_once`` is how many vehicles at most were
-    in zones, or seen from them.
+    in zones, or seen from them. ``meters`` has one entry an update of a meter, None without any.
     """
 
     corridor: Corridor
@@ -110,3 +125,4 @@ class CorridorOutcome:
     messages: tuple[Mapping[str, int], ...]
     until_s: float
     most_at_once: int
+    meters: Mapping[str, Sequence[Any]] | None = None

@@ -78,9 +78,10 @@ COOPERATIVE = {
     "slots": Look("slots", VERMILION, "o", "-"),
     "mixed-slots": Look("mixed slots", GREEN, "o", "-"),
 }
-METERED = {"alinea": Look("ALINEA", GREY, "P", ":")}
-METERED_MARKER = "H"
-"""Of metered drivers, who have the colour of the same drivers without control."""
+METERED = {"alinea": Look("ALINEA", GREY, "P", ":"), "hero": Look("HERO", GREEN, "P", "--")}
+METERED_MARKER, COORDINATED_MARKER = "H", "8"
+"""Of metered drivers, and of those whose meters are coordinated. They have the colour of the same
+drivers without control."""
 
 
 FREE_MARKERS = "h>d1"
@@ -109,7 +110,8 @@ def _metered(strategy: str, drivers: str | None) -> Look | None:
     of_drivers = UNCONTROLLED.get(drivers)
     colour = known.colour if of_drivers is None else of_drivers.colour
     label = f"{known.label}, {drivers} drivers"
-    return replace(known, label=label, colour=colour, marker=METERED_MARKER)
+    marker = COORDINATED_MARKER if strategy == "hero" else METERED_MARKER
+    return replace(known, label=label, colour=colour, marker=marker)
 
 
 def _look_of_another(name: str) -> Look:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import polars as pl
 
@@ -18,11 +18,14 @@ from coramp.metrics.corridor_tables import corridor_tables, totals_of
 from coramp.records.files import write_json, write_parquet
 from coramp.records.run_folder import CORRIDOR, MARK
 from coramp.records.schemas import RESULT_VERSION, Row
+from coramp.runs.metering import check_metered_corridor
 from coramp.runs.mixed import check_mixed, coordinates_drivers
 from coramp.runs.running import finite_or_none, versions
 from coramp.scenarios.corridors import Corridor, load_corridor
 from coramp.scenarios.loading import drivers_checked
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ
+from coramp.strategies.base import is_metered
+from coramp.strategies.metering import MetersRamps
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.sumo.corridor import Coordination, run_corridor
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
@@ -103,6 +106,7 @@ def corridor_spec(
         if chosen.cooperative and own.drift_problem:
             raise CorampError(own.drift_problem)
         check_mixed(own, chosen, "sumo", population)
+    check_metered_corridor(corridor, chosen, population)
     return CorridorSpec(corridor, strategy, population, seed)
 
 
@@ -121,14 +125,21 @@ def execute_corridor(
 ) -> CorridorResult:
     """Returns the tables of a corridor's run; raises CorampError where it fails."""
     started = time.perf_counter()
-    corridor, coordination = spec.corridor, None
-    if strategy_named(spec.strategy).cooperative and corridor.common.has_automated:
+    corridor, coordination, metering = spec.corridor, None, None
+    if is_metered(strategy_named(spec.strategy)):
+        metering = strategy_to_run(spec.strategy, corridor.common.strategy.get(spec.strategy))
+    elif strategy_named(spec.strategy).cooperative and corridor.common.has_automated:
         made: Any = strategy_to_run(spec.strategy, corridor.common.strategy.get(spec.strategy))
         coordination = Coordination(
             spec.strategy, float(made.decision_s), processes_checked(processes)
         )
     outcome = run_corridor(
-        corridor, coordination, spec.drivers, spec.seed, options or SumoOptions()
+        corridor,
+        coordination,
+        spec.drivers,
+        spec.seed,
+        options or SumoOptions(),
+        cast("MetersRamps | None", metering),
     )
     frames = corridor_tables(outcome)
     totals = totals_of(outcome, frames["sites"])

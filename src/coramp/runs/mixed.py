@@ -7,7 +7,7 @@ from typing import Any
 from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import TABLES
-from coramp.strategies.base import Strategy, is_metered, steps_of_period
+from coramp.strategies.base import Strategy, coordinates_meters, steps_of_period
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
 from coramp.worlds.sumo.mixed_setup import safety_law_of
@@ -23,8 +23,6 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
     why, instead = _asked_for(scenario)
     if engine != "sumo":
         raise CorampError(f"engine: {engine} cannot run where {why}; choose sumo, or {instead}")
-    if is_metered(strategy) and not scenario.has_one_lane:
-        raise CorampError(f"strategy: {strategy.name} cannot run where {why}; allowed is {instead}")
     if strategy.cooperative and not coordinates_drivers(strategy):
         able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
         raise CorampError(
@@ -83,6 +81,8 @@ def _asked_for(scenario: Scenario) -> tuple[str, str]:
 
 
 def _among_drivers(strategy: type[Strategy]) -> bool:
+    if coordinates_meters(strategy):
+        return False  # at one merge site
     return not strategy.cooperative or coordinates_drivers(strategy)
 
 

@@ -17,6 +17,7 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
+from coramp.runs.metering import check_metering, room_notice
 from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_drivers
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
@@ -25,7 +26,7 @@ from coramp.scenarios.population_files import is_population_file, read_populatio
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
-from coramp.strategies.base import Strategy, is_metered
+from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M, run_cooperative
@@ -155,12 +156,11 @@ def make_spec(
     _check_types(loaded, chosen)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)
-    if is_metered(chosen) and loaded.signal_problem:
-        raise CorampError(loaded.signal_problem)
     population = None
     among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
     if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
+        check_metering(loaded, chosen, population)
     if among_drivers or (loaded.gives_shares and not chosen.cooperative):
         check_mixed(loaded, chosen, engine, population or "")
     elif chosen.cooperative:
@@ -290,6 +290,8 @@ def recorded(
         warning = slow_merge_warning(spec.scenario)
         if warning is not None:
             notice(warning)
+    if (line := room_notice(spec.scenario, spec.strategy, spec.drivers)) is not None:
+        notice(line)
     tables, row = execute(spec, replace(options or SumoOptions(), keep_heard=True))
     if (line := unserved_line(tables.outcome)) is not None:
         notice(line)

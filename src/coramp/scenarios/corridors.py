@@ -1,7 +1,7 @@
 """Corridors: a scenario file with ``[corridor]``, as the scenario of each of its merge sites."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -130,6 +130,12 @@ def corridor_of(
     except CorampError as error:
         raise CorampError(*(_told(line, label) for line in error.messages)) from error
     return Corridor(scenarios[0].name, section, roads, scenarios, zones)
+
+
+def on_network(corridor: Corridor, file: Path) -> Corridor:
+    """Returns a corridor on another network that has the same sites, of the same lengths."""
+    section = corridor.section.model_copy(update={"file": str(file), "sha256": sha256_of(file)})
+    return replace(corridor, section=section, roads=_roads(section))
 
 
 def _told(line: str, label: str) -> str:

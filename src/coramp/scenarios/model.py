@@ -55,7 +55,7 @@ from coramp.strategies.parameters import Value
 from coramp.vehicles.traits import CAR, Traits
 
 NEAREST_STOP_M = -1.0
-SIGNAL_STATION_M = -60.0
+SIGNAL_STATION_M, LAST_SIGNAL_M = -60.0, -1.0
 REACTION_S = 1.0
 SURE_STEP_S, SPEED_DRIFT_MPS2 = 0.1, 1.0
 """With longer steps SUMO was seen to be faster than planned by 0.62 m/s2 times the step."""
@@ -283,16 +283,31 @@ class Scenario(Model):
 
     @property
     def signal_station_m(self) -> float:
-        """Station of the stop line of ramp metering."""
+        """Station of the stop line of ramp metering, nearer to the nose where the ramp is short."""
         given = self.ramp.signal_station_m
-        return max(SIGNAL_STATION_M, 0.25 * self.ramp.start_m) if given is None else given
+        if given is not None:
+            return given
+        return max(SIGNAL_STATION_M, 0.25 * self.ramp.start_m, self.first_signal_m)
+
+    @property
+    def first_signal_m(self) -> float:
+        """The first station on the ramp at which who has entered can stop in comfort."""
+        speed_mps = self.ramp.limit_mps
+        if self.network is not None:
+            speed_mps = max(self.ramp.entry_speed_mps)
+        braking_m = 0.5 * speed_mps**2 / self.motion.comfort_mps2
+        return self.ramp.start_m + speed_mps * REACTION_S + braking_m
 
     @property
     def signal_problem(self) -> str:
         """What keeps the ramp from being metered: who enters must be able to stop at the line."""
-        speed_mps = self.ramp.limit_mps
-        braking_m = 0.5 * speed_mps**2 / self.motion.comfort_mps2
-        first_m = self.ramp.start_m + speed_mps * REACTION_S + braking_m
+        first_m, start_m = self.first_signal_m, self.ramp.start_m
+        if first_m > LAST_SIGNAL_M:
+            return (
+                f"ramp.start_m: the ramp is {-start_m:g} m long, and who enters it takes "
+                f"{first_m - start_m:.1f} m to stop at a signal; allowed is a ramp of "
+                f"{first_m - start_m - LAST_SIGNAL_M:.1f} m or more"
+            )
         if self.signal_station_m >= first_m:
             return ""
         return (

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from coramp.errors import CorampError
 from coramp.scenarios.vehicle_types import VehicleType, share_problems
-from coramp.strategies.base import vehicles_may_differ
+from coramp.strategies.base import coordinates_meters, vehicles_may_differ
 from coramp.strategies.registry import strategies, strategy_named
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def check_vehicles_may_differ(scenario: "Scenario", strategy: str) -> None:
     able = ", ".join(
         name
         for name, kind in strategies().items()
-        if vehicles_may_differ(kind) or not kind.cooperative
+        if vehicles_may_differ(kind) or not (kind.cooperative or coordinates_meters(kind))
     )
     raise CorampError(
         f"strategy: {strategy} plans for vehicles that are alike but for their length and mass; "

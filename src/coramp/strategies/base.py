@@ -274,7 +274,8 @@ class Strategy(Decider, Protocol):
 
     A frozen dataclass whose fields are its parameters (``strategies.parameters``). One that steers
     by feedback, or sets a signal, also has ``period_s`` (s): see ``period_of``. ``metered`` is True
-    for one that needs a signal and detectors on the ramp, in SUMO. ``vehicles_may_differ`` is True
+    for one that needs a signal and detectors on the ramp, in SUMO; ``coordinates_meters`` for one
+    that is for several ramps (``strategies.metering``). ``vehicles_may_differ`` is True
     for one that plans with vehicles' own limits; others are refused where vehicles differ.
     ``entry_policy`` is what it
     asks of entries, if anything: see ``entry_policy_of``. One whose parameters must fit
@@ -316,3 +317,8 @@ def vehicles_may_differ(strategy: Decider | type[Strategy]) -> bool:
 def is_metered(strategy: Decider | type[Strategy]) -> bool:
     """Returns whether a strategy needs a signal and detectors at the ramp."""
     return bool(getattr(strategy, "metered", False))
+
+
+def coordinates_meters(strategy: type[Strategy]) -> bool:
+    """Returns whether a strategy coordinates the meters of several ramps."""
+    return bool(getattr(strategy, "coordinates_meters", False))

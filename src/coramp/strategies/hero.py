@@ -12,9 +12,11 @@ the most upstream one first.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from coramp.strategies.alinea import SECONDS_AN_HOUR
+from coramp.strategies.alinea import SECONDS_AN_HOUR, Alinea
+from coramp.strategies.metering import ALONE, MASTER, SLAVE, Update
+from coramp.strategies.parameters import parameter
 
 
 class Meter(NamedTuple):
@@ -141,3 +143,85 @@ def balanced_queues_veh(meters: Sequence[Meter]) -> list[float]:
     """
     share = filled_share(meters)
     return [share * meter.room_veh for meter in meters]
+
+
+@dataclass(frozen=True)
+class Hero(Alinea):
+    """ALINEA at each ramp of a corridor; a ramp whose queue grows has those upstream hold back.
+
+    It is for corridors: one ramp alone is metered as by ALINEA, with control of its queue.
+    """
+
+    name: ClassVar[str] = "hero"
+    summary: ClassVar[str] = "ramp metering of a corridor, coordinated by HERO's rules"
+    coordinates_meters: ClassVar[bool] = True
+
+    near_percent: float = parameter(
+        90.0, 1.0, 100.0, meaning="of o_target: above it a ramp can become a master"
+    )
+    far_percent: float = parameter(
+        80.0, 0.0, 100.0, meaning="of o_target: below it a master lets its slaves go"
+    )
+    begins_percent: float = parameter(
+        30.0, 1.0, 100.0, meaning="of the ramp's room: above it a queue makes a ramp a master"
+    )
+    ends_percent: float = parameter(
+        15.0, 0.0, 100.0, meaning="of the ramp's room: below it a master lets its slaves go"
+    )
+
+    def problems(self) -> list[str]:
+        """Returns what does not fit together: thresholds that end what they would begin."""
+        found = super().problems()
+        for begins, ends in (("near", "far"), ("begins", "ends")):
+            most, least = getattr(self, f"{begins}_percent"), getattr(self, f"{ends}_percent")
+            if least > most:
+                found.append(
+                    f"{ends}_percent: {least:g} is above {begins}_percent; allowed is up to "
+                    f"{most:g}"
+                )
+        return found
+
+    @property
+    def coordination(self) -> Coordination:
+        """How the meters are coordinated."""
+        return Coordination(
+            self.target_occupancy_percent,
+            self.gain_veh_h,
+            self.least_veh_h,
+            self.most_veh_h,
+            self.update_s,
+            self.near_percent / 100.0,
+            self.far_percent / 100.0,
+            self.begins_percent / 100.0,
+            self.ends_percent / 100.0,
+        )
+
+    def rates(
+        self, measured: Sequence[Update], roads: Sequence[Sequence[int]], coordinated: Any
+    ) -> tuple[list[Update], Any]:
+        """Returns the updates with coordinated rates; clusters lie on one road each."""
+        rule, found = self.coordination, list(measured)
+        before = coordinated or tuple(() for _ in roads)
+        after = []
+        for road, was in zip(roads, before, strict=True):
+            meters = [_meter(measured[place]) for place in road]
+            clusters = rule.clusters(was, meters)
+            rates = rule.rates_veh_h(clusters, meters)
+            master = {k: cluster.master for cluster in clusters for k in cluster.members}
+            for k, (place, rate) in enumerate(zip(road, rates, strict=True)):
+                role = ALONE if k not in master else MASTER if master[k] == k else SLAVE
+                found[place] = measured[place]._replace(
+                    rate_veh_h=rate, role=role, master=road[master.get(k, k)]
+                )
+            after.append(clusters)
+        return found, tuple(after)
+
+
+def _meter(measured: Update) -> Meter:
+    return Meter(
+        measured.occupancy_percent,
+        measured.rate_veh_h,
+        measured.arrivals_veh_h,
+        measured.queue_veh,
+        measured.room_veh,
+    )

@@ -12,6 +12,7 @@ from coramp.strategies.base import Strategy
 from coramp.strategies.dp_sequence import DpSequence
 from coramp.strategies.fifo_optimal_control import FifoOptimalControl
 from coramp.strategies.game import Game
+from coramp.strategies.hero import Hero
 from coramp.strategies.mainline_priority import MainlinePriority
 from coramp.strategies.milp_sequence import MilpSequence
 from coramp.strategies.mixed_slots import MixedSlots
@@ -63,6 +64,7 @@ _OURS: tuple[type[Strategy], ...] = (
     Slots,
     MixedSlots,
     Alinea,
+    Hero,
     Uncontrolled,
 )
 for _strategy in _OURS:

@@ -4,7 +4,7 @@ import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,9 +16,16 @@ from coramp.records.corridor_outcome import CorridorOutcome
 from coramp.scenarios.corridors import Corridor
 from coramp.scenarios.sections import DriverPopulation
 from coramp.strategies.base import steps_of_period
+from coramp.strategies.metering import MetersRamps
 from coramp.worlds.faults.actuators import SlowActuators
 from coramp.worlds.outcomes import cap_step_of
 from coramp.worlds.sumo.careless import Careless
+from coramp.worlds.sumo.corridor_meters import (
+    CorridorMeters,
+    metered_corridor,
+    metering_on,
+    rows_of,
+)
 from coramp.worlds.sumo.corridor_plant import CorridorPlant, ZoneUsers
 from coramp.worlds.sumo.corridor_record import HAND_OVER, PASSAGE, CorridorRecord
 from coramp.worlds.sumo.corridor_road import CorridorRoad, corridor_road, corridor_routes
@@ -86,15 +93,23 @@ def run_corridor(
     population: str,
     seed: int,
     options: SumoOptions,
+    metering: MetersRamps | None = None,
 ) -> CorridorOutcome:
-    """Returns what happened on a corridor: coordinated by sites, or with drivers alone."""
-    planned = _planned(corridor, coordination, corridor.common.drivers[population], seed)
+    """Returns what happened on a corridor: coordinated by sites, or with drivers alone.
+
+    ``metering`` meters the ramps of a corridor that nobody coordinates.
+    """
+    metered = None if metering is None else metered_corridor(corridor)
+    on = corridor if metered is None else metered.corridor
+    planned = _planned(on, coordination, corridor.common.drivers[population], seed)
     step_s, road = corridor.common.control.step_s, planned.road
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
         ballistic = coordination is None and planned.drivers.integrator == "ballistic"
         files = CorridorFiles(Path(name), corridor.common, road, seed, options, ballistic)
         files.write_routes(corridor_routes(planned.drivers, planned.traffic, planned.kinds, road))
         files.write_additional()
+        if metered is not None:
+            files.write_loops(metered.loops(planned.period_s, road.additional))
         running = nullcontext() if coordination is None else planned.sites_running(coordination)
         with (
             running as sites,
@@ -105,9 +120,13 @@ def run_corridor(
                 Careless(scenario, session, seed + k)
                 for k, scenario in enumerate(corridor.scenarios)
             ]
-            driven = _drive(plant, sites, careless, cap_step_of(corridor.common))
+            meters = metering_on(session, step_s, metered, metering)
+            driven = _drive(plant, sites, careless, cap_step_of(corridor.common), meters)
         files.keep()
-        return _outcome(planned, plant, files, driven)
+        outcome = _outcome(planned, plant, files, driven)
+        if meters is None:
+            return outcome
+        return replace(outcome, corridor=corridor, meters=rows_of(meters.updates, corridor))
 
 
 @dataclass(frozen=True)
@@ -246,13 +265,18 @@ def _vehicles(corridor: Corridor, traffic: Sequence[Traffic]) -> dict[str, Any]:
 
 
 def _drive(
-    plant: CorridorPlant, sites: Sites | None, careless: Sequence[Careless], cap_step: int
+    plant: CorridorPlant,
+    sites: Sites | None,
+    careless: Sequence[Careless],
+    cap_step: int,
+    meters: CorridorMeters | None = None,
 ) -> _DrivenUntil:
-    """Lets SUMO run until it is empty."""
+    """Lets SUMO run until it is empty; ``meters`` let it go on where there are some."""
+    step_to = plant.session.step_to if meters is None else meters.step_to
     step, most = 0, 0
     while step < cap_step and (step == 0 or plant.session.vehicles_left()):
         step = min(cap_step, step + plant.period_steps)
-        plant.session.step_to(step)
+        step_to(step)
         now_s = step * plant.step_s
         zones = plant.look(now_s)
         most = max(most, sum(len(zone.names) for zone in zones))

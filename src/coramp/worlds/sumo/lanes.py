@@ -87,11 +87,14 @@ class LanedRoad:
 def road_of(
     scenario: Scenario, drivers: DriverPopulation, metered: bool = False
 ) -> RoadPlan | LanedRoad:
-    """Returns the road of a scenario for drivers: coramp's own, or that of its network."""
+    """Returns the road of a scenario for drivers: coramp's own, or that of its network.
+
+    ``metered`` puts a signal on coramp's own ramp beside one lane.
+    """
     if scenario.network is not None:
         section = scenario.network
         return laned_road(Path(section.file), site_of(section))
-    plan = driver_road_plan(scenario, drivers, metered)
+    plan = driver_road_plan(scenario, drivers, metered and scenario.has_one_lane)
     return plan if plan.lanes == 1 else _made(plan)
 
 

@@ -23,6 +23,7 @@ from coramp.worlds.sumo.careless import Careless, CarelessDrivers
 from coramp.worlds.sumo.demand import KRAUSS, Automated, driver_routes
 from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
 from coramp.worlds.sumo.lanes import LanedRoad, road_of
+from coramp.worlds.sumo.metered_road import metered_road
 from coramp.worlds.sumo.metering import Meter, loops
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.telling import DriversInSumo, with_answers
@@ -52,7 +53,9 @@ def run_uncontrolled(
     arrivals = arrivals_of(scenario, seed)
     metered = is_metered(strategy)
     automated = alone_among_drivers(scenario, arrivals, seed)
-    plan = road_of(scenario, drivers, metered)
+    plan, places = (
+        metered_road(scenario, drivers) if metered else (road_of(scenario, drivers), None)
+    )
     laned = plan if isinstance(plan, LanedRoad) else None
     step_s, cap_step = scenario.control.step_s, cap_step_of(scenario)
     with tempfile.TemporaryDirectory(prefix="coramp-") as name:
@@ -65,11 +68,11 @@ def run_uncontrolled(
         files.write_additional()
         files.write_detectors(arrivals)
         look_steps = steps_of_period(period_of(strategy) or LOOK_S, step_s)
-        if metered:
-            files.write_loops(loops(scenario, look_steps * step_s))
+        if places is not None:
+            files.write_loops(loops([places], look_steps * step_s, plan.additional))
         with Session(files.options(), step_s, options.gui, options.tell) as session:
             road = DriversInSumo(session, plan.spans(), step_s)
-            meter = Meter(session, step_s) if metered else None
+            meter = None if places is None else Meter(session, step_s, places)
             service = Service(
                 strategy, scenario.rules(), scenario.fastest_mainline_entry_mps, road.ask
             )
