@@ -236,7 +236,8 @@ def study(
         run_missing(store, specs, jobs, report)
         searched = run_searches(store, searches, jobs, report)
     everything = {spec.run_id: spec for spec in (*specs, *searched)}
-    runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
+    ordered: list[RunSpec] = sorted(everything.values(), key=sort_key)
+    runs, streams = store.frames(store.parts(ordered))
     scenario = load_scenario(definition.source).model_dump(mode="json")
     tables = summary_tables(definition, runs, KMH if kmh else MPS, scenario)
     keep_shown(store.folder, definition, runs.filter(status="ok"), notice or (lambda _: None))

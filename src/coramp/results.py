@@ -127,7 +127,8 @@ class CorridorStudyResult(StudyResult):
         """Returns how a notebook shows the study: its tables and its figure."""
         from coramp.report.page.notebook import corridor_study_html
 
-        return corridor_study_html(self)
+        went_well = bool(self.runs.filter(status="ok").height)
+        return corridor_study_html(self.tables, self.plot_delay() if went_well else None)
 
     def to_pandas(self) -> dict[str, "pd.DataFrame"]:
         """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""

@@ -10,11 +10,24 @@ from coramp.errors import CorampError
 from coramp.records.corridor_outcome import CORRIDOR_FILES, SITES, TOTALS
 from coramp.records.files import read_json
 from coramp.records.run_folder import CORRIDOR, MARK, SUMO, SUMO_NETWORK, check_version
-from coramp.records.schemas import Row
+from coramp.records.schemas import Row, Schema
 from coramp.records.stored_checks import checked_frame
 from coramp.scenarios.corridors import TABLE, Corridor, corridor_of
 
 POSITIONS = "fcd.parquet"
+KEYS = ("vehicle_id", "step")
+PLACES: Schema = {
+    "vehicle_id": pl.String,
+    "step": pl.Int64,
+    "type": pl.String,
+    "lane": pl.String,
+    "pos": pl.Float64,
+    "x": pl.Float64,
+    "y": pl.Float64,
+    "angle": pl.Float64,
+    "speed": pl.Float64,
+}
+"""What positions tell, by SUMO's names: of lane and position on it (m), of x and y (m)."""
 NEEDED = (
     "scenario", "strategy", "drivers", "seed", "specification", "versions", "summary", "sites",
 )  # fmt: skip
@@ -39,10 +52,37 @@ class CorridorRecords:
         return float(self.content["specification"]["simulation"]["horizon_s"])
 
     @property
-    def positions_file(self) -> Path | None:
-        """SUMO's positions, None where they were not kept."""
-        path = self.folder / SUMO / POSITIONS
-        return path if path.exists() else None
+    def step_s(self) -> float:
+        """SUMO's step."""
+        return float(self.content["specification"]["control"]["step_s"])
+
+    @property
+    def has_positions(self) -> bool:
+        """Whether SUMO's positions were kept."""
+        return (self.folder / SUMO / POSITIONS).exists()
+
+    def positions(self, every: int = 1) -> pl.LazyFrame:
+        """Returns where vehicles were at each step of SUMO's, or at each so many, by time.
+
+        Columns are those of ``PLACES``. Raises CorampError where positions were not kept.
+        """
+        if not self.has_positions:
+            raise CorampError(
+                f"{self.folder}: holds no positions; run again with --keep-sumo in another folder"
+            )
+        written = pl.scan_parquet(self.folder / SUMO / POSITIONS)
+        if "vehicle_id" not in written.collect_schema():  # nobody ever drove
+            return pl.LazyFrame(schema=PLACES)
+        step = (pl.col("timestep_time") / self.step_s).round().cast(pl.Int64)
+        return (
+            written.drop_nulls("vehicle_id")
+            .filter(step % every == 0)
+            .select(
+                "vehicle_id",
+                step=step,
+                **{name: pl.col(f"vehicle_{name}") for name in PLACES if name not in KEYS},
+            )
+        )
 
     def corridor(self) -> Corridor:
         """Returns the corridor, by the network that was kept beside SUMO's positions.

@@ -143,9 +143,7 @@ def corridor_spec(
     return CorridorSpec(corridor, strategy, population, seed, _differing(scenario, overrides or {}))
 
 
-def _differing(
-    scenario: str, settings: Mapping[str, Any]
-) -> tuple[tuple[str, Any], ...]:
+def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     """What was set and differs from the scenario's file."""
     if not settings:
         return ()

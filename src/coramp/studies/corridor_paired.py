@@ -47,7 +47,9 @@ def delays_of(runs: pl.DataFrame, sites: pl.DataFrame) -> pl.DataFrame:
     columns = ("run_id", "place", *DELAYS)
     count = pl.sum_horizontal(served)
     mean_s = pl.when(count > 0).then(lost_s / count)
-    by_site = sites.select("run_id", pl.col("site").alias("place"), mean_s.alias("delay_s"), *DELAYS[1:])
+    by_site = sites.select(
+        "run_id", pl.col("site").alias("place"), mean_s.alias("delay_s"), *DELAYS[1:]
+    )
     whole = runs.select(
         "run_id", pl.lit(WHOLE).alias("place"), pl.col("mean_delay_s").alias("delay_s"), *DELAYS[1:]
     )
@@ -114,9 +116,7 @@ def _estimates(
     found = [(alone.get(place), own.get(place)) for own, alone in pairs]
     both = [(more, less) for more, less in found if more is not None and less is not None]
     all_s, mainline_s, ramp_s = (
-        estimate(
-            [m[k] - o[k] for m, o in both if m[k] is not None and o[k] is not None]
-        )
+        estimate([m[k] - o[k] for m, o in both if m[k] is not None and o[k] is not None])
         for k in range(len(DELAYS))
     )
     return all_s, mainline_s, ramp_s

@@ -82,9 +82,7 @@ def _whole(good: pl.DataFrame, names: Names) -> Table:
     return Table("The corridor", columns, tuple(rows), (DELAY_NOTE,), kept)
 
 
-def _by_site(
-    good: pl.DataFrame, sites: pl.DataFrame, names: Names
-) -> Table:
+def _by_site(good: pl.DataFrame, sites: pl.DataFrame, names: Names) -> Table:
     both = good.select("run_id", *GROUP).join(sites, on="run_id", maintain_order="left")
     rows = []
     for site in sites["site"].unique(maintain_order=True):
@@ -109,9 +107,7 @@ def _by_site(
     return Table("By site", columns, tuple(rows), (SITE_NOTE,), kept)
 
 
-def gain_table(
-    good: pl.DataFrame, sites: pl.DataFrame, names: Names
-) -> Table | None:
+def gain_table(good: pl.DataFrame, sites: pl.DataFrame, names: Names) -> Table | None:
     """Returns the gains against uncontrolled; None where nothing can be compared."""
     rows = tuple(
         (
