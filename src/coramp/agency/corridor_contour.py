@@ -64,6 +64,7 @@ def _seen(records: CorridorRecords, lanes: list[dict[str, float]]) -> pl.DataFra
         records.positions(max(1, round(LOOK_S / records.step_s)))
         .filter(lane.is_in(list(road_of)))
         .select(
+            "vehicle_id",
             road=lane.replace_strict(road_of, return_dtype=pl.Int64),
             time_s=pl.col("step") * records.step_s,
             way_m=lane.replace_strict(starts_m, return_dtype=pl.Float64) + pl.col("pos"),
