@@ -1,18 +1,19 @@
 """What notebooks and the command line call: run, study, load, plan, figures, register."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coramp.errors import CorampError
+from coramp.records.corridor_run import holds_corridor, read_corridor
 from coramp.records.files import made_folder
 from coramp.records.run import RunRecords
 from coramp.records.run_folder import MARK as RUN_MARK
 from coramp.records.run_folder import SUMO, not_replaceable, read_run, write_run
 from coramp.records.staging import staged_folder
-from coramp.results import PlanResult, RunResult, StudyResult, as_pandas
+from coramp.results import CorridorStudyResult, PlanResult, RunResult, StudyResult, as_pandas
 from coramp.runs.beforehand import (
     demand_above_limit,
     demands_above_limit,
@@ -22,6 +23,7 @@ from coramp.runs.beforehand import (
 )
 from coramp.runs.corridors import (
     CorridorResult,
+    CorridorSpec,
     corridor_spec,
     execute_corridor,
     processes_checked,
@@ -31,18 +33,21 @@ from coramp.runs.corridors import (
 from coramp.runs.metering import room_lines
 from coramp.runs.planning import plan_snapshot
 from coramp.runs.running import RunSpec, engine_checked, make_spec, recorded, stored_spec
+from coramp.scenarios.corridors import load_corridor
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.snapshots import load_snapshot
 from coramp.strategies import registry
 from coramp.studies.breakdown import bisections
 from coramp.studies.cluster import connected
+from coramp.studies.corridor_grid import count_corridor_runs, expand_corridor, is_of_corridor
+from coramp.studies.corridor_summary import corridor_study_tables
 from coramp.studies.definition import Study, count_runs, expand, load_study, sort_key
 from coramp.studies.outlook import Outlook, outlook_of
 from coramp.studies.runner import ALL_WORKERS, Progress, run_missing, run_searches, usable_cores
 from coramp.studies.shown import keep_shown
 from coramp.studies.speed_unit import KMH, MPS
 from coramp.studies.store import MARK as STUDY_MARK
-from coramp.studies.store import Store
+from coramp.studies.store import OF_CORRIDOR, Store
 from coramp.studies.summary import summary_tables, to_markdown
 from coramp.worlds.sumo.files import SumoOptions
 
@@ -52,6 +57,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CorridorResult",
+    "CorridorStudyResult",
     "PlanResult",
     "RunResult",
     "StudyResult",
@@ -69,6 +75,7 @@ __all__ = [
 register = registry.register
 MANY_RUNS = 100_000
 """More runs than this are asked about first."""
+CHANGED = "the scenario file was changed since: runs that the change concerns are run again"
 
 
 def run(
@@ -208,8 +215,16 @@ def study(
     """
     definition, seeds = _defined(name, seeds, engine, many)
     jobs = _jobs_checked(jobs)
-    specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     report = progress or (lambda _: None)
+    if is_of_corridor(definition):
+        runs_to_do = expand_corridor(definition, seeds, name)
+        with connected(cluster) if cluster is not None else nullcontext():
+            store = Store(_folder_of(definition, out), definition, OF_CORRIDOR)
+            if notice is not None and store.scenario_changed:
+                notice(CHANGED)
+            run_missing(store, runs_to_do, ALL_WORKERS if cluster is not None else jobs, report)
+        return _corridor_study(store, definition, runs_to_do)
+    specs, searches = expand(definition, seeds, name), bisections(definition, seeds, name)
     if notice is not None and (line := demands_above_limit(specs)) is not None:
         notice(line)
     if notice is not None and (line := without_effect_on_drivers(specs)) is not None:
@@ -221,14 +236,13 @@ def study(
     with connected(cluster) if cluster is not None else nullcontext():
         store = Store(_folder_of(definition, out), definition)
         if notice is not None and store.scenario_changed:
-            notice(
-                "the scenario file was changed since: runs that the change concerns are run again"
-            )
+            notice(CHANGED)
         jobs = ALL_WORKERS if cluster is not None else jobs
         run_missing(store, specs, jobs, report)
         searched = run_searches(store, searches, jobs, report)
     everything = {spec.run_id: spec for spec in (*specs, *searched)}
-    runs, streams = store.frames(store.parts(sorted(everything.values(), key=sort_key)))
+    ordered: list[RunSpec] = sorted(everything.values(), key=sort_key)
+    runs, streams = store.frames(store.parts(ordered))
     scenario = load_scenario(definition.source).model_dump(mode="json")
     tables = summary_tables(definition, runs, KMH if kmh else MPS, scenario)
     keep_shown(store.folder, definition, runs.filter(status="ok"), notice or (lambda _: None))
@@ -238,6 +252,16 @@ def study(
 
         save_capacity_figure(runs, store.folder / "capacity.png")
     return StudyResult(store.folder, runs, streams, tuple(tables), definition.layout)
+
+
+def _corridor_study(
+    store: Store, definition: Study, specs: Sequence[CorridorSpec]
+) -> CorridorStudyResult:
+    """What a corridor's study amounts to, once all of it has run; writes its tables."""
+    runs, sites = store.frames(store.parts(specs))
+    tables = corridor_study_tables(runs, sites, load_corridor(definition.source).as_data())
+    store.write_tables(runs, sites, to_markdown(definition, tables))
+    return CorridorStudyResult.of(store.folder, runs, sites, tuple(tables))
 
 
 def outlook(
@@ -251,11 +275,16 @@ def outlook(
 ) -> Outlook:
     """Returns how much of a study is done and how long the rest should take; runs nothing."""
     definition, seeds = _defined(name, seeds, engine, many)
+    folder, jobs = _folder_of(definition, out), _jobs_checked(jobs)
+    begun = (folder / STUDY_MARK).exists()
+    if is_of_corridor(definition):
+        runs_to_do = expand_corridor(definition, seeds, name)
+        store = Store(folder, definition, OF_CORRIDOR) if begun else None
+        return outlook_of(store, folder, runs_to_do, (), jobs)
     specs = expand(definition, seeds, name)
     searches = bisections(definition, seeds, name)
-    folder = _folder_of(definition, out)
-    store = Store(folder, definition) if (folder / STUDY_MARK).exists() else None
-    return outlook_of(store, folder, specs, searches, _jobs_checked(jobs))
+    store = Store(folder, definition) if begun else None
+    return outlook_of(store, folder, specs, searches, jobs)
 
 
 def _jobs_checked(jobs: int | None) -> int:
@@ -271,7 +300,8 @@ def _defined(name: str, seeds: int | None, engine: str | None, many: bool) -> tu
         definition = definition.on_engine(engine_checked(engine))
     seeds = definition.seeds if seeds is None else seeds
     try:
-        runs = count_runs(definition, max(1, seeds))
+        count = count_corridor_runs if is_of_corridor(definition) else count_runs
+        runs = count(definition, max(1, seeds))
     except CorampError as error:
         raise CorampError(*(f"{name}: {line}" for line in error.messages)) from None
     if runs > MANY_RUNS and not many:
@@ -285,7 +315,7 @@ def _folder_of(definition: Study, out: str | Path | None) -> Path:
     return Path(out) if out is not None else Path("out") / definition.name
 
 
-def load(folder: str | Path) -> RunResult | StudyResult:
+def load(folder: str | Path) -> RunResult | StudyResult | CorridorResult:
     """Returns the run or the study that lies in a folder, with its tables and figures.
 
     Of a study that is not finished, what is done. Raises CorampError where there is neither, or it
@@ -293,8 +323,18 @@ def load(folder: str | Path) -> RunResult | StudyResult:
     """
     place = Path(folder)
     if (place / STUDY_MARK).exists():
-        from coramp.report.study_folder import scenario_of, stored_runs, stored_streams
+        from coramp.report.study_folder import (
+            is_corridor_study,
+            scenario_of,
+            stored_corridor,
+            stored_runs,
+            stored_streams,
+        )
 
+        if is_corridor_study(place):
+            _, runs, sites = stored_corridor(place)
+            told = tuple(corridor_study_tables(runs, sites, scenario_of(place)))
+            return CorridorStudyResult.of(place, runs, sites, told)
         definition, runs = stored_runs(place)
         streams = stored_streams(place, definition)
         tables = tuple(summary_tables(definition, runs, scenario=scenario_of(place)))
@@ -304,6 +344,9 @@ def load(folder: str | Path) -> RunResult | StudyResult:
             f"{place}: holds no run and no study; give a folder that coramp run --out or coramp "
             "study has written"
         )
+    if holds_corridor(place):
+        found = read_corridor(place)
+        return CorridorResult(found.content, found.frames)
     records = read_run(place)
     return _with_spec(records, stored_spec(records.content, records.scenario))
 

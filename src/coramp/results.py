@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import polars as pl
 
@@ -10,14 +10,18 @@ from coramp.errors import CorampError
 from coramp.explain.decision import quantities
 from coramp.explain.quantity import Quantity
 from coramp.explain.words import NOT_TOLD, tried_lines
+from coramp.records.schemas import STREAM_ROWS
 from coramp.report.plots import PlanPlots, RunPlots, StudyPlots
 from coramp.report.short_texts import plan_text, run_text, study_text
+from coramp.runs.corridors import broken_on_corridor
 from coramp.runs.planning import PlannedSnapshot
 from coramp.runs.running import RunSpec, broken_promises
 from coramp.studies.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from coramp.report.style import Figure
 
 
 @dataclass(frozen=True, repr=False)
@@ -79,6 +83,56 @@ class StudyResult(StudyPlots):
     def to_pandas(self) -> dict[str, "pd.DataFrame"]:
         """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
         return {"runs": as_pandas(self.runs), "streams": as_pandas(self.streams)}
+
+
+@dataclass(frozen=True, repr=False)
+class CorridorStudyResult(StudyResult):
+    """A corridor's study: one row a run, one row a run and site, and the tables that sum them up.
+
+    There are no rows by stream; those of ``sites`` have the figures of both.
+    """
+
+    sites: pl.DataFrame = field(kw_only=True)
+
+    @classmethod
+    def of(
+        cls, folder: Path, runs: pl.DataFrame, sites: pl.DataFrame, tables: tuple[Table, ...]
+    ) -> Self:
+        """Returns the result of a study in a folder."""
+        return cls(folder, runs, pl.DataFrame(schema=STREAM_ROWS), tables, sites=sites)
+
+    @property
+    def broken_promises(self) -> list[str]:
+        """What automated vehicles promised and did not keep, with settings and seeds."""
+        return [
+            f"{row['strategy']}, {row['overrides'] or 'as in the scenario'}, seed {row['seed']}: "
+            f"{'; '.join(broken)}"
+            for row in self.runs.filter(status="ok").iter_rows(named=True)
+            if (broken := broken_on_corridor(row))
+        ]
+
+    def plot_delay(self, over: str | None = None) -> "Figure":
+        """Returns the mean delay (s) of each strategy by site, with 95 % intervals over seeds.
+
+        Raises CorampError where no run went well, and for ``over``: it is always by site.
+        """
+        from coramp.report.corridor_figures import study_delay_figure
+        from coramp.report.study_folder import scenario_of
+
+        if over not in (None, "site"):
+            raise CorampError(f"over: {over}: a corridor's study is drawn by site; leave it out")
+        return study_delay_figure(self._good(), self.sites, scenario_of(self.folder))
+
+    def _repr_html_(self) -> str:
+        """Returns how a notebook shows the study: its tables and its figure."""
+        from coramp.report.page.notebook import corridor_study_html
+
+        went_well = bool(self.runs.filter(status="ok").height)
+        return corridor_study_html(self.tables, self.plot_delay() if went_well else None)
+
+    def to_pandas(self) -> dict[str, "pd.DataFrame"]:
+        """Returns the records as pandas frames; needs pandas (``pip install coramp[pandas]``)."""
+        return {"runs": as_pandas(self.runs), "sites": as_pandas(self.sites)}
 
 
 @dataclass(frozen=True, repr=False)

@@ -262,7 +262,7 @@ def test_a_run_that_must_fail_fails_alone():
     assert part.run["status"] == "failed"
     assert "nobody" in part.run["error"]
     assert part.run["run_id"] == hopeless.run_id
-    assert part.streams == []
+    assert part.rows == []
 
 
 @dataclass(frozen=True)

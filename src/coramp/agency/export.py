@@ -10,13 +10,15 @@ from coramp.agency.sumo_detectors import definition_xml, output_xml, router_csv,
 from coramp.agency.tables import agency_tables
 from coramp.errors import CorampError
 from coramp.metrics.queues import INTERVAL_S
+from coramp.records.corridor_run import holds_corridor, read_corridor
 from coramp.records.files import write_text
 from coramp.records.run_folder import MARK as RUN_MARK
 from coramp.records.run_folder import read_run
 from coramp.records.staging import staged_folder
 from coramp.studies.store import MARK as STUDY_MARK
 
-STUDY_TABLES = ("runs", "streams")
+STUDY_TABLES = ("runs", "streams", "sites")
+"""A study has the second, a corridor's the third."""
 LOOP_FILES = ("loops.add.xml", "loops.xml", "flowrouter.det.xml", "flowrouter.csv")
 BETWEEN = " "
 """What stands between the entries of a list in a cell."""
@@ -38,12 +40,16 @@ def export(folder: Path, out: Path) -> list[Path]:
 
 def _texts(folder: Path) -> dict[str, str]:
     if (folder / STUDY_MARK).exists():
-        return {f"{name}.csv": csv_text(_study_table(folder, name)) for name in STUDY_TABLES}
+        names = [n for n in STUDY_TABLES if n == "runs" or (folder / f"{n}.parquet").exists()]
+        return {f"{name}.csv": csv_text(_study_table(folder, name)) for name in names}
     if not (folder / RUN_MARK).exists():
         raise CorampError(
             f"{folder}: holds no run and no study; give a folder that coramp run --out or coramp "
             "study has written"
         )
+    if holds_corridor(folder):
+        tables = read_corridor(folder).frames
+        return {f"{name}.csv": csv_text(frame) for name, frame in tables.items()}
     run = read_run(folder)
     motion = motion_of(run)
     found = agency_tables(motion)

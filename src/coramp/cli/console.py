@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from coramp.api import PlanResult, RunResult, StudyResult
+from coramp.api import CorridorStudyResult, PlanResult, RunResult, StudyResult
 from coramp.audit.verdicts import Audit
 from coramp.cli.run_table import run_table
 from coramp.cli.table_text import text_lines
@@ -257,7 +257,8 @@ def print_study(result: StudyResult, wide: bool = False) -> None:
     """Prints a study's tables and where they lie."""
     for table in result.tables:
         print_table(table, wide)
-    print(f"Results are in {result.folder}: runs.parquet, streams.parquet, tables.md.")
+    rows = "sites" if isinstance(result, CorridorStudyResult) else "streams"
+    print(f"Results are in {result.folder}: runs.parquet, {rows}.parquet, tables.md.")
 
 
 def print_outlook(ahead: Outlook, wide: bool = False) -> None:

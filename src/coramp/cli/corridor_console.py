@@ -35,6 +35,11 @@ def run_corridor_command(
 
     Raises CorampError for options that are those of one merge site.
     """
+    if "--keep-messages" in refused:
+        raise CorampError(
+            f"--keep-messages: {scenario} is a corridor, whose coordinators keep no messages; "
+            "allowed is --keep-sumo, which keeps where all vehicles were"
+        )
     if refused:
         raise CorampError(
             f"{refused[0]}: is for one merge site; {scenario} is a corridor: allowed is the "
@@ -69,7 +74,7 @@ def run_corridor_command(
     print_table(sites_table(result), wide)
     print_table(totals_table(result.content), wide)
     if out is not None:
-        print(f"Records are in {out}; sites.parquet holds one row a site.")
+        print(f"Records are in {out}; coramp report {out} shows them.")
     return result
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray
-from coramp.records.schemas import Schema
+from coramp.records.schemas import RUN_KEYS, Schema
 from coramp.scenarios.corridors import Corridor
 
 SITES: Schema = {
@@ -96,6 +96,31 @@ TOTALS = (
     "collisions", "collisions_by_automated", "plan_error_m", "until_s", "most_at_once",
 )  # fmt: skip
 """What a corridor's run amounts to."""
+TOTAL_KINDS: Schema = {
+    name: pl.Float64 if name.endswith(("_s", "_km", "_m")) else pl.Int64 for name in TOTALS
+}
+TRIP_FIGURES: Schema = {
+    "mainline_delay_s": pl.Float64,
+    "ramp_delay_s": pl.Float64,
+    "travel_p50_s": pl.Float64,
+    "travel_p95_s": pl.Float64,
+    "fallbacks": pl.Int64,
+}
+"""What a study has of each run beside the totals: of trips, and of all sites together."""
+CORRIDOR_RUNS: Schema = {
+    "run_id": pl.String,
+    **RUN_KEYS,
+    "overrides": pl.String,
+    "status": pl.String,
+    "error": pl.String,
+    **TOTAL_KINDS,
+    **TRIP_FIGURES,
+    "wall_s": pl.Float64,
+    "settings": pl.String,
+}
+"""The columns of ``runs.parquet`` of a corridor's study."""
+CORRIDOR_SITES: Schema = {"run_id": pl.String, **SITES}
+"""Those of its ``sites.parquet``."""
 
 
 @dataclass(frozen=True)

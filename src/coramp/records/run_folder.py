@@ -99,8 +99,8 @@ def read_run(folder: Path) -> RunRecords:
     content = read_json(folder / MARK)
     if isinstance(content, dict) and content.get("kind") == CORRIDOR:
         raise CorampError(
-            f"{folder}: holds the run of a corridor; this reads runs of one merge site; allowed is "
-            "its tables, such as sites.parquet"
+            f"{folder}: holds the run of a corridor; this reads runs of one merge site; allowed "
+            "are coramp report, replay and export, and its tables, such as sites.parquet"
         )
     if not isinstance(content, dict) or content.get("kind") != "run" or "summary" not in content:
         raise CorampError(f"{folder / MARK}: does not describe a run; run again to write it anew")

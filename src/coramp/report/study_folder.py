@@ -12,7 +12,7 @@ from coramp.records.run_folder import check_version
 from coramp.records.schemas import RESULT_VERSION, RUNS, STREAM_ROWS, Row
 from coramp.records.stored_checks import checked_frame, first_of
 from coramp.studies.definition import Study
-from coramp.studies.store import MARK, Store
+from coramp.studies.store import KINDS, MARK, OF_CORRIDOR, Store
 
 DRAWN = ("paper", "sensitivity", "capacity", "field", "baseline", "penetration", "hostile")
 """The layouts of studies that there are figures of."""
@@ -76,7 +76,8 @@ def study_content(folder: Path) -> Row:
     Raises CorampError where it describes no study, or one of another version.
     """
     content = read_json(folder / MARK)
-    if not isinstance(content, dict) or content.get("kind") != "study":
+    kinds = [tables.kind for tables in KINDS]
+    if not isinstance(content, dict) or content.get("kind") not in kinds:
         raise CorampError(f"{folder / MARK}: does not describe a study; give another folder")
     check_version(folder, content)
     if content.get("result_version") != RESULT_VERSION:
@@ -105,6 +106,27 @@ def stored_runs(folder: Path) -> tuple[Study, pl.DataFrame]:
         return study, _frame(folder / "runs.parquet", RUNS)
     store = Store(folder, study)
     return study, store.frames(store.everything())[0]
+
+
+def is_corridor_study(folder: Path) -> bool:
+    """Returns whether a folder holds the study of a corridor."""
+    try:
+        return bool(study_content(folder)["kind"] == OF_CORRIDOR.kind)
+    except CorampError:
+        return False
+
+
+def stored_corridor(folder: Path) -> tuple[Study, pl.DataFrame, pl.DataFrame]:
+    """Returns a corridor's study, its runs and its rows by site, as many as are done.
+
+    Raises CorampError where there is none, or it cannot be read.
+    """
+    study = checked_study(folder / MARK, study_content(folder))
+    if _is_finished(folder):
+        runs = _frame(folder / "runs.parquet", OF_CORRIDOR.runs)
+        return study, runs, _frame(folder / f"{OF_CORRIDOR.rows}.parquet", OF_CORRIDOR.row)
+    store = Store(folder, study, OF_CORRIDOR)
+    return study, *store.frames(store.everything())
 
 
 def stored_streams(folder: Path, study: Study) -> pl.DataFrame:

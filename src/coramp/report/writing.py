@@ -5,12 +5,17 @@ from pathlib import Path
 
 from coramp.agency.before_after import Pairs
 from coramp.errors import CorampError
+from coramp.records.corridor_run import CorridorRecords, holds_corridor, read_corridor
 from coramp.records.files import write_text
 from coramp.records.run import RunRecords
 from coramp.records.run_folder import MARK, REPLAY, REPORT, read_run
 from coramp.records.schemas import Row
+from coramp.report.page.corridor_page import corridor_page
+from coramp.report.page.corridor_replay import corridor_replay_page
+from coramp.report.page.corridor_study_page import corridor_study_page
 from coramp.report.page.pages import compared_page, replay_page, run_page
 from coramp.report.page.study_page import study_page
+from coramp.report.study_folder import is_corridor_study
 from coramp.scenarios.toml_files import builtin_names, override_text
 from coramp.studies.speed_unit import KMH, MPS
 from coramp.studies.store import MARK as STUDY_MARK
@@ -38,13 +43,17 @@ def report(
     if (place / STUDY_MARK).exists():
         if against is not None:
             raise CorampError("--against: a study compares by itself; give it with a run only")
-        _write_page(target, study_page(place, unit))
+        of_corridor = is_corridor_study(place)
+        _write_page(target, corridor_study_page(place) if of_corridor else study_page(place, unit))
         return target
     if not (place / MARK).exists():
         raise CorampError(
             f"{place}: holds no run and no study; give a folder that coramp run --out or coramp "
             "study has written"
         )
+    if holds_corridor(place):
+        _write_page(target, corridor_page(_corridors(place, against), unit))
+        return target
     stored = [read_run(Path(name)) for name in (place, against) if name is not None]
     page = run_page(stored, stored[0].content["versions"], _repeat(stored), unit)
     _write_page(target, page)
@@ -57,10 +66,25 @@ def replay(folder: str | Path, against: str | Path | None = None) -> Path:
     ``against`` is the folder of another run on the same arrivals, shown beside it. Raises
     CorampError where there is no run, arrivals differ, or it cannot be written.
     """
-    runs = [read_run(Path(name)) for name in (folder, against) if name is not None]
     target = Path(folder) / REPLAY
+    if holds_corridor(Path(folder)):
+        _write_page(target, corridor_replay_page(_corridors(folder, against)))
+        return target
+    runs = [read_run(Path(name)) for name in (folder, against) if name is not None]
     _write_page(target, replay_page(runs))
     return target
+
+
+def _corridors(folder: str | Path, against: str | Path | None) -> list[CorridorRecords]:
+    """The run of a corridor, and another beside it, which must be one too."""
+    folders = [Path(name) for name in (folder, against) if name is not None]
+    for place in folders[1:]:
+        if not holds_corridor(place):
+            raise CorampError(
+                f"--against: {place}: holds no run of a corridor; allowed is one on the same "
+                "arrivals"
+            )
+    return [read_corridor(place) for place in folders]
 
 
 def compared(target: Path, pairs: Pairs, *, kmh: bool = False) -> Path:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,7 +21,13 @@ from coramp.records.run_folder import CORRIDOR, MARK
 from coramp.records.schemas import RESULT_VERSION, Row
 from coramp.runs.metering import check_metered_corridor
 from coramp.runs.mixed import check_mixed, coordinates_drivers
-from coramp.runs.running import finite_or_none, versions
+from coramp.runs.running import (
+    differing,
+    finite_or_none,
+    overrides_json,
+    overrides_text,
+    versions,
+)
 from coramp.scenarios.corridors import Corridor, load_corridor
 from coramp.scenarios.loading import drivers_checked
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ
@@ -34,19 +41,23 @@ from coramp.worlds.sumo.files import SumoOptions
 MOST_PROCESSES = 64
 CONTENT = (
     "kind", "result_version", "run_id", "scenario", "strategy", "drivers", "seed",
-    "specification", "versions", "summary", "sites", "processes", "wall_s",
+    "specification", "versions", "summary", "sites", "processes", "wall_s", "settings",
 )  # fmt: skip
 """The keys of a corridor's ``run.json``."""
 
 
 @dataclass(frozen=True)
 class CorridorSpec:
-    """All that determines a corridor's run; how many processes it takes changes nothing."""
+    """All that determines a corridor's run; how many processes it takes changes nothing.
+
+    ``overrides`` are what was set and differs from the scenario's file.
+    """
 
     corridor: Corridor
     strategy: str
     drivers: str
     seed: int
+    overrides: tuple[tuple[str, Any], ...] = ()
 
     @cached_property
     def run_id(self) -> str:
@@ -54,6 +65,25 @@ class CorridorSpec:
         versioned = [RESULT_VERSION, metadata.version("libsumo"), self.corridor.as_data()]
         text = json.dumps([*versioned, self.strategy, self.drivers, self.seed], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def keys(self) -> Row:
+        """The columns that runs are sorted by; flows are those of all roads, and of all ramps."""
+        return {
+            "scenario": self.corridor.name,
+            "drivers": self.drivers,
+            "strategy": self.strategy,
+            "engine": "sumo",
+            "mainline_veh_h": math.fsum(s.mainline.flow_veh_h for s in self.corridor.scenarios),
+            "ramp_veh_h": math.fsum(s.ramp.flow_veh_h for s in self.corridor.scenarios),
+            "seed": self.seed,
+            "overrides": overrides_text(self.overrides),
+        }
+
+    @property
+    def settings(self) -> str | None:
+        """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
+        return overrides_json(self.overrides)
 
 
 @dataclass(frozen=True)
@@ -76,14 +106,17 @@ class CorridorResult:
     @property
     def broken_promises(self) -> list[str]:
         """What automated vehicles promised and did not keep, in words."""
-        broken, row = [], self.summary
-        if row["collisions_by_automated"]:
-            broken.append(
-                f"{row['collisions_by_automated']} collisions that automated vehicles caused"
-            )
-        if (row["plan_error_m"] or 0.0) > LARGEST_PLAN_ERROR_M:
-            broken.append(f"driven {row['plan_error_m']:.3f} m off plan")
-        return broken
+        return broken_on_corridor(self.summary)
+
+
+def broken_on_corridor(row: Mapping[str, Any]) -> list[str]:
+    """Returns in words what automated vehicles did not keep, by the totals of a run."""
+    broken = []
+    if row["collisions_by_automated"]:
+        broken.append(f"{row['collisions_by_automated']} collisions that automated vehicles caused")
+    if (row["plan_error_m"] or 0.0) > LARGEST_PLAN_ERROR_M:
+        broken.append(f"driven {row['plan_error_m']:.3f} m off plan")
+    return broken
 
 
 def corridor_spec(
@@ -93,12 +126,16 @@ def corridor_spec(
     drivers: str | None = None,
     overrides: Mapping[str, Any] | None = None,
     seed: int = 1,
+    origin: str = "--set",
 ) -> CorridorSpec:
-    """Returns the specification of a corridor's run; raises CorampError for what cannot be run."""
+    """Returns the specification of a corridor's run; raises CorampError for what cannot be run.
+
+    ``origin`` is what overrides are blamed on.
+    """
     chosen = strategy_named(strategy)
     if not isinstance(seed, int) or not 0 <= seed < 2**31:
         raise CorampError(f"seed: {seed} is out of range; allowed is 0 to {2**31 - 1}")
-    corridor = load_corridor(scenario, overrides)
+    corridor = load_corridor(scenario, overrides, origin)
     population = drivers_checked(corridor.common, drivers or corridor.common.traffic.drivers)
     for own in corridor.scenarios:
         if not (own.is_mixed and coordinates_drivers(chosen)):
@@ -107,7 +144,18 @@ def corridor_spec(
             raise CorampError(own.drift_problem)
         check_mixed(own, chosen, "sumo", population)
     check_metered_corridor(corridor, chosen, population)
-    return CorridorSpec(corridor, strategy, population, seed)
+    return CorridorSpec(corridor, strategy, population, seed, _differing(scenario, overrides or {}))
+
+
+def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """What was set and differs from the scenario's file."""
+    if not settings:
+        return ()
+    try:
+        plain = load_corridor(scenario).as_data()
+    except CorampError:  # valid only with its overrides
+        return tuple(sorted(settings.items()))
+    return differing(settings, plain)
 
 
 def processes_checked(processes: int) -> int:
@@ -157,6 +205,7 @@ def execute_corridor(
         "sites": frames["sites"].to_dicts(),
         "processes": processes,
         "wall_s": time.perf_counter() - started,
+        "settings": dict(spec.overrides),
     }
     return CorridorResult({key: finite_or_none(content[key]) for key in CONTENT}, frames)
 

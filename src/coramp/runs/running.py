@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import metadata
@@ -44,6 +44,8 @@ OPTIONS = {
     "simulation.horizon_s": "--horizon",
 }
 """Options of the command line that stand for keys of a scenario."""
+Overrides = Sequence[tuple[str, Any]]
+"""What was set, by dotted keys of a scenario."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class RunSpec:
             "mainline_veh_h": float(self.scenario.mainline.flow_veh_h),
             "ramp_veh_h": float(self.scenario.ramp.flow_veh_h),
             "seed": self.seed,
-            "overrides": " ".join(f"{key}={value}" for key, value in self.overrides) or None,
+            "overrides": overrides_text(self.overrides),
         }
 
     @property
@@ -102,7 +104,7 @@ class RunSpec:
     @property
     def settings(self) -> str | None:
         """The overrides as JSON, for a row; ``studies.overrides`` reads it."""
-        return json.dumps(dict(self.overrides), default=str) if self.overrides else None
+        return overrides_json(self.overrides)
 
     def as_data(self) -> Row:
         """Returns the specification as plain data."""
@@ -228,7 +230,22 @@ def _differing(scenario: str, settings: Mapping[str, Any]) -> tuple[tuple[str, A
         plain = load_scenario(scenario).model_dump(mode="json")
     except CorampError:  # valid only with its overrides
         return tuple(sorted(others.items()))
-    return tuple(sorted((k, v) for k, v in others.items() if _looked_up(plain, k) != v))
+    return differing(others, plain)
+
+
+def differing(settings: Mapping[str, Any], plain: Row) -> tuple[tuple[str, Any], ...]:
+    """Returns those of dotted settings that the content of a scenario does not have already."""
+    return tuple(sorted((k, v) for k, v in settings.items() if _looked_up(plain, k) != v))
+
+
+def overrides_text(overrides: Overrides) -> str | None:
+    """Returns overrides as a row's text; ``studies.overrides`` reads the JSON beside it."""
+    return " ".join(f"{key}={value}" for key, value in overrides) or None
+
+
+def overrides_json(overrides: Overrides) -> str | None:
+    """Returns overrides as JSON, None for none."""
+    return json.dumps(dict(overrides), default=str) if overrides else None
 
 
 def _looked_up(data: Any, dotted: str) -> Any:

@@ -96,14 +96,17 @@ def is_corridor(name: str) -> bool:
     return TABLE in read("scenarios", name)[1]
 
 
-def load_corridor(name: str, overrides: Mapping[str, Any] | None = None) -> Corridor:
+def load_corridor(
+    name: str, overrides: Mapping[str, Any] | None = None, origin: str = "--set"
+) -> Corridor:
     """Returns the corridor of a scenario file, with dotted keys overridden.
 
-    Raises CorampError with a line for what is wrong.
+    Raises CorampError with a line for what is wrong; ``origin`` is what overrides are blamed on,
+    an empty one leaves it to the caller to tell.
     """
     label, data = read("scenarios", name)
     overrides = overrides or {}
-    blamed = dict.fromkeys(overrides, "--set")
+    blamed = dict.fromkeys(overrides, origin)
     data = with_overrides(data, overrides, blamed)
     return corridor_of(data, label, blamed)
 
@@ -128,7 +131,7 @@ def corridor_of(
         zones = tuple(_zone(section, site) for road in roads for site in road.sites)
         _check_apart(roads, zones)
     except CorampError as error:
-        raise CorampError(*(_told(line, label) for line in error.messages)) from error
+        raise CorampError(*(_told(line, label, blamed) for line in error.messages)) from error
     return Corridor(scenarios[0].name, section, roads, scenarios, zones)
 
 
@@ -138,11 +141,12 @@ def on_network(corridor: Corridor, file: Path) -> Corridor:
     return replace(corridor, section=section, roads=_roads(section))
 
 
-def _told(line: str, label: str) -> str:
+def _told(line: str, label: str, blamed: Mapping[str, str]) -> str:
     """A line that begins with its origin and names the corridor's own keys."""
     for key, own in FLOWS.items():
         line = line.replace(key, own)
-    return line if line.startswith((label, "--set")) else f"{label}: {line}"
+    callers = (f"{key}:" for key, origin in blamed.items() if not origin)
+    return line if line.startswith((label, "--set", *callers)) else f"{label}: {line}"
 
 
 def _roads(section: CorridorSection) -> tuple[ThroughRoad, ...]:
@@ -173,6 +177,11 @@ def _roads(section: CorridorSection) -> tuple[ThroughRoad, ...]:
     except CorampError as error:
         key = "exits" if "exit" in str(error) else "sites"
         raise CorampError(f"{TABLE}.{key}: {error}") from error
+
+
+def network_of(corridor: Corridor) -> Network:
+    """Returns the network of a corridor; raises CorampError where it cannot be read."""
+    return _network(corridor.file, corridor.section.sha256)[0]
 
 
 @cache

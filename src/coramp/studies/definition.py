@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from coramp.errors import CorampError
+from coramp.runs.corridors import CorridorSpec
 from coramp.runs.mixed import coordinates_drivers
 from coramp.runs.running import DEFAULT_DRIVERS, RunSpec, make_spec
 from coramp.scenarios.sections import Flow, Model
@@ -189,7 +190,7 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     file to name, else it is the study's name.
     """
     label = label or study.name
-    _check_source(study, seeds, label)
+    check_source(study, seeds, label)
     specs: dict[str, RunSpec] = {}
     problems: dict[str, None] = {}
     for grid in study.runs:
@@ -212,7 +213,8 @@ def expand(study: Study, seeds: int, label: str | None = None) -> list[RunSpec]:
     return sorted(specs.values(), key=sort_key)
 
 
-def _check_source(study: Study, seeds: int, label: str) -> None:
+def check_source(study: Study, seeds: int, label: str) -> None:
+    """Raises CorampError where there are no seeds, or the scenario cannot be read."""
     if seeds < 1:
         raise CorampError(f"--seeds: {seeds} is too small; allowed is at least 1")
     try:
@@ -280,7 +282,7 @@ def count_runs(study: Study, seeds: int) -> int:
     return (grids + searches) * seeds
 
 
-def sort_key(spec: RunSpec) -> tuple[Any, ...]:
+def sort_key(spec: RunSpec | CorridorSpec) -> tuple[Any, ...]:
     """Returns what runs are sorted by; null drivers come first."""
     keys = spec.keys
     return tuple((value is not None, value) for value in (*keys.values(), spec.run_id))

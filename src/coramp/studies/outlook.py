@@ -7,12 +7,21 @@ from pathlib import Path
 from statistics import median
 
 from coramp.records.schemas import Row
-from coramp.runs.running import RunSpec
+from coramp.runs.corridors import CorridorSpec
+from coramp.strategies.registry import strategy_named
 from coramp.studies.breakdown import Bisection
+from coramp.studies.runner import AnySpec
 from coramp.studies.store import Store
 
-SECONDS_PER_VEHICLE = {("exact", False): 5e-5, ("sumo", False): 8e-4, ("sumo", True): 2e-3}
-"""By engine, and whether drivers drive: of runs on the machine of docs/performance.md."""
+SECONDS_PER_VEHICLE = {
+    ("exact", False): 5e-5,
+    ("sumo", False): 8e-4,
+    ("sumo", True): 2e-3,
+    ("corridor", False): 4e-3,
+    ("corridor", True): 2e-2,
+}
+"""By engine, and whether drivers drive, or on a corridor whether vehicles are coordinated: of runs
+on the machine of docs/performance.md."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class Outlook:
 def outlook_of(
     store: Store | None,
     folder: Path,
-    specs: Sequence[RunSpec],
+    specs: Sequence[AnySpec],
     searches: Sequence[Bisection],
     jobs: int,
 ) -> Outlook:
@@ -55,7 +64,7 @@ def outlook_of(
     failed: set[str] = set()
     damaged: set[str] = set()
 
-    def result_of(spec: RunSpec) -> Row | None:
+    def result_of(spec: AnySpec) -> Row | None:
         part = store.stored(spec) if store is not None else None
         if part is None:
             if store is not None and store.is_damaged(spec):
@@ -67,9 +76,12 @@ def outlook_of(
         return part.run
 
     seen: dict[tuple[str, bool], list[float]] = defaultdict(list)
-    missing, likely, done = [], [], 0
+    missing: list[AnySpec] = []
+    likely: list[AnySpec] = []
+    done = 0
     walks = [search.so_far(result_of) for search in searches]
-    for spec in {s.run_id: s for s in (*specs, *(s for taken, _ in walks for s in taken))}.values():
+    asked = (*specs, *(spec for taken, _ in walks for spec in taken))
+    for spec in {s.run_id: s for s in asked}.values():
         run = result_of(spec)
         if run is None:
             missing.append(spec)
@@ -82,17 +94,21 @@ def outlook_of(
     expected_s = sum(per_vehicle_s[_kind(s)] * _vehicles(s) for s in (*missing, *likely)) / jobs
     runs = done + len(missing)
     changed = store is not None and store.scenario_changed
-    asked = (*specs, *(spec for taken, _ in walks for spec in taken))
     outdated = store.count_of_others(asked) if store is not None and changed else 0
     counts = (runs, done, len(failed), len(damaged), len(likely), jobs)
     return Outlook(folder, *counts, expected_s, outdated)
 
 
-def _kind(spec: RunSpec) -> tuple[str, bool]:
+def _kind(spec: AnySpec) -> tuple[str, bool]:
+    if isinstance(spec, CorridorSpec):
+        return "corridor", strategy_named(spec.strategy).cooperative
     return spec.engine, spec.drivers is not None
 
 
-def _vehicles(spec: RunSpec) -> float:
+def _vehicles(spec: AnySpec) -> float:
+    if isinstance(spec, CorridorSpec):
+        flow_veh_h = float(spec.keys["mainline_veh_h"]) + float(spec.keys["ramp_veh_h"])
+        return flow_veh_h * spec.corridor.common.simulation.horizon_s / 3600.0
     scenario = spec.scenario
     streams = (scenario.mainline, scenario.ramp)
     flow_veh_h = sum(0.5 * sum(stream.flows_veh_h) for stream in streams)

@@ -136,12 +136,17 @@ def _by_arrivals(
 ) -> dict[tuple[str, tuple[float, float], str], dict[Cell, dict[int, tuple[float | None, ...]]]]:
     groups: dict[Any, dict[Cell, dict[int, tuple[float | None, ...]]]] = {}
     for row in good.iter_rows(named=True):
-        arrivals = {k: v for k, v in overrides_of(row).items() if not _says_nothing_of_arrivals(k)}
+        arrivals = arrivals_set(row)
         flow = row["mainline_veh_h"], row["ramp_veh_h"]
         cell = Cell.of_run(row)
         by_seed = groups.setdefault((row["scenario"], flow, str(arrivals)), {}).setdefault(cell, {})
         by_seed[row["seed"]] = tuple(row[name] for name in DELAYS)
     return groups
+
+
+def arrivals_set(run: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns what a row of ``runs.parquet`` sets that says who arrives."""
+    return {k: v for k, v in overrides_of(run).items() if not _says_nothing_of_arrivals(k)}
 
 
 def _says_nothing_of_arrivals(key: str) -> bool:

@@ -13,6 +13,8 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
+from coramp.runs.corridor_rows import corridor_row, failed_corridor_row, site_rows
+from coramp.runs.corridors import CorridorSpec, execute_corridor
 from coramp.runs.running import RunSpec, execute, failed_row
 from coramp.studies.breakdown import Bisection
 from coramp.studies.definition import sort_key
@@ -38,16 +40,35 @@ class Progress:
     last: Part | None = None
 
 
-def execute_part(spec: RunSpec) -> Part:
+AnySpec = RunSpec | CorridorSpec
+"""A run of one merge site, or of a corridor of several."""
+
+
+def execute_part(spec: AnySpec) -> Part:
     """Returns the part of one run, a failed one too: what goes wrong stays in its own row."""
     started = time.perf_counter()
     try:
-        tables, row = execute(spec)
+        return _corridor_part(spec) if isinstance(spec, CorridorSpec) else _part(spec)
     except CorampError as error:
-        return Part(failed_row(spec, "; ".join(error.messages), time.perf_counter() - started), [])
+        text = "; ".join(error.messages)
     except Exception as error:  # noqa: BLE001 - a bug in one run must not take the study down
         text = f"{type(error).__name__}: {error}"
-        return Part(failed_row(spec, text, time.perf_counter() - started), [])
+    return _failed(spec, text, time.perf_counter() - started)
+
+
+def _failed(spec: AnySpec, error: str, wall_s: float) -> Part:
+    if isinstance(spec, CorridorSpec):
+        return Part(failed_corridor_row(spec, error, wall_s), [])
+    return Part(failed_row(spec, error, wall_s), [])
+
+
+def _corridor_part(spec: CorridorSpec) -> Part:
+    result = execute_corridor(spec)
+    return Part(corridor_row(spec, result), site_rows(spec, result))
+
+
+def _part(spec: RunSpec) -> Part:
+    tables, row = execute(spec)
     flows = {
         "mainline": spec.scenario.mainline.flow_veh_h,
         "ramp": spec.scenario.ramp.flow_veh_h,
@@ -60,7 +81,7 @@ def execute_part(spec: RunSpec) -> Part:
 
 
 def run_missing(
-    store: Store, specs: Sequence[RunSpec], jobs: int, report: Callable[[Progress], None]
+    store: Store, specs: Sequence[AnySpec], jobs: int, report: Callable[[Progress], None]
 ) -> None:
     """Runs what the store lacks of the given runs, and keeps each result as it comes.
 
@@ -79,7 +100,7 @@ def run_missing(
             report(Progress(len(specs), done, skipped, failed, damaged, part))
 
 
-Results = Generator[tuple[RunSpec, Part], None, None]
+Results = Generator[tuple[AnySpec, Part], None, None]
 
 
 @contextmanager
@@ -128,7 +149,7 @@ def run_searches(
     return sorted(taken.values(), key=sort_key)
 
 
-def _results(specs: Sequence[RunSpec], jobs: int) -> Results:
+def _results(specs: Sequence[AnySpec], jobs: int) -> Results:
     """Yields runs as they are done.
 
     Where a worker dies, what it had not done is run again; what is left after some deaths runs
@@ -148,11 +169,11 @@ def _results(specs: Sequence[RunSpec], jobs: int) -> Results:
             (part,) = _in_workers([spec], max(2, jobs) if jobs != ALL_WORKERS else jobs)
         except TerminatedWorkerError:
             died = f"strategy {spec.keys['strategy']}: the process that ran it died"
-            part = Part(failed_row(spec, died, 0.0), [])
+            part = _failed(spec, died, 0.0)
         yield spec, part
 
 
-def _in_workers(specs: Sequence[RunSpec], jobs: int) -> Iterator[Part]:
+def _in_workers(specs: Sequence[AnySpec], jobs: int) -> Iterator[Part]:
     parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
     yield from parallel(joblib.delayed(execute_part)(spec) for spec in specs)
 

@@ -10,11 +10,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import polars as pl
 
 from coramp.errors import CorampError
+from coramp.records.corridor_outcome import CORRIDOR_RUNS, CORRIDOR_SITES
 from coramp.records.files import (
     made_folder,
     read_json,
@@ -22,9 +23,10 @@ from coramp.records.files import (
     write_parquet,
     write_text,
 )
-from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAM_ROWS, Row
+from coramp.records.schemas import RESULT_VERSION, RUN_KEYS, RUNS, STREAM_ROWS, Row, Schema
 from coramp.records.unfinished import is_unfinished
-from coramp.runs.running import RunSpec, versions
+from coramp.runs.running import versions
+from coramp.scenarios.corridors import is_corridor, load_corridor
 from coramp.scenarios.loading import load_scenario
 from coramp.studies.definition import Study
 from coramp.studies.own_files import own_files
@@ -39,6 +41,7 @@ OURS = (
     "shown",
     "runs.parquet",
     "streams.parquet",
+    "sites.parquet",
     "tables.md",
     "capacity.png",
     "report.html",
@@ -46,30 +49,64 @@ OURS = (
 """What a study writes into its folder."""
 
 
+class Spec(Protocol):
+    """What a store needs of a run: its hash, and the columns that runs are sorted by."""
+
+    @property
+    def run_id(self) -> str:
+        """A hash of all that determines it."""
+        ...
+
+    @property
+    def keys(self) -> Row:
+        """The columns that runs are sorted by."""
+        ...
+
+
+class Tables(NamedTuple):
+    """What a study is called in its folder, and the columns of its two tables.
+
+    ``rows`` is the name of the table that has several rows a run, ``by`` the column that tells them
+    apart.
+    """
+
+    kind: str
+    runs: Schema
+    rows: str
+    row: Schema
+    by: str
+
+
+OF_ONE_SITE = Tables("study", RUNS, "streams", STREAM_ROWS, "stream")
+OF_CORRIDOR = Tables("corridor study", CORRIDOR_RUNS, "sites", CORRIDOR_SITES, "site")
+KINDS = (OF_ONE_SITE, OF_CORRIDOR)
+
+
 @dataclass(frozen=True)
 class Part:
-    """What one run leaves in a study."""
+    """What one run leaves in a study: its row, and one of each stream, or site of a corridor."""
 
     run: Row
-    streams: list[Row]
+    rows: list[Row]
 
 
 class Store:
     """The folder of a study."""
 
-    def __init__(self, folder: Path, study: Study) -> None:
+    def __init__(self, folder: Path, study: Study, tables: Tables = OF_ONE_SITE) -> None:
         """Opens or makes the folder.
 
         Raises CorampError where it holds another study, a run or foreign files.
         """
         self.folder = folder
         self._study = study
+        self._tables = tables
         self._claim(study)
         made_folder(folder / PARTS)
 
     def _claim(self, study: Study) -> None:
         content = {
-            "kind": "study",
+            "kind": self._tables.kind,
             "result_version": RESULT_VERSION,
             "study": study.model_dump(mode="json"),
             "versions": versions(),
@@ -83,7 +120,7 @@ class Store:
                     f"{found.get('result_version')}, this one writes {RESULT_VERSION}); "
                     "give another folder"
                 )
-            if found.get("study") != content["study"]:
+            if any(found.get(key) != content[key] for key in ("study", "kind")):
                 name = found.get("study", {}).get("name")
                 raise CorampError(
                     f"{self.folder}: holds another study ({name!r} with another definition); "
@@ -114,38 +151,38 @@ class Store:
             found = read_json(mark)
         except CorampError:
             return None
-        if not isinstance(found, dict) or found.get("kind") != "study":
+        if not isinstance(found, dict) or found.get("kind") not in [k.kind for k in KINDS]:
             raise CorampError(f"{mark}: does not describe a study; give another folder")
         return found
 
-    def part_path(self, spec: RunSpec) -> Path:
+    def part_path(self, spec: Spec) -> Path:
         """Returns where the part of a run lies."""
         return self.folder / PARTS / f"{spec.run_id}.json"
 
-    def stored(self, spec: RunSpec) -> Part | None:
+    def stored(self, spec: Spec) -> Part | None:
         """Returns the part of a run, a failed one too, None if it is missing or damaged."""
-        return _part_in(self.part_path(spec))
+        return _part_in(self.part_path(spec), self._tables)
 
     def everything(self) -> Iterator[Part]:
         """Yields every part that is there and whole, whatever asked for it."""
         for path in sorted((self.folder / PARTS).glob("*.json")):
-            part = _part_in(path)
+            part = _part_in(path, self._tables)
             if part is not None:
                 yield part
 
-    def read(self, spec: RunSpec) -> Part | None:
+    def read(self, spec: Spec) -> Part | None:
         """Returns the part of a run, None if it is missing or damaged or the run had failed."""
         part = self.stored(spec)
         return part if part is not None and part.run["status"] == "ok" else None
 
-    def is_damaged(self, spec: RunSpec) -> bool:
+    def is_damaged(self, spec: Spec) -> bool:
         """Returns whether there is a part that cannot be used."""
         return self.part_path(spec).exists() and self.stored(spec) is None
 
-    def write(self, spec: RunSpec, part: Part) -> None:
+    def write(self, spec: Spec, part: Part) -> None:
         """Writes the part of a run."""
-        run, streams = _encoded(part.run), [_encoded(row) for row in part.streams]
-        content = {"run": run, "streams": streams, "sha256": _checksum(run, streams)}
+        run, rows = _encoded(part.run), [_encoded(row) for row in part.rows]
+        content = {"run": run, self._tables.rows: rows, "sha256": _checksum(run, rows)}
         try:
             write_json(self.part_path(spec), content)
         except CorampError as error:
@@ -153,7 +190,7 @@ class Store:
                 f"{error}; runs that are done are kept, start again to go on"
             ) from error
 
-    def parts(self, specs: Iterable[RunSpec]) -> Iterator[Part]:
+    def parts(self, specs: Iterable[Spec]) -> Iterator[Part]:
         """Yields what there is of the given runs, failed ones too, in their order."""
         for spec in specs:
             part = self.stored(spec)
@@ -161,19 +198,20 @@ class Store:
                 yield part
 
     def frames(self, parts: Iterable[Part]) -> tuple[pl.DataFrame, pl.DataFrame]:
-        """Returns the tables of runs and of streams, in the order of the parts."""
-        runs, streams = [pl.DataFrame(schema=RUNS)], [pl.DataFrame(schema=STREAM_ROWS)]
+        """Returns the tables of runs and of streams or sites, in the order of the parts."""
+        of_run, of_row = self._tables.runs, self._tables.row
+        runs, rows = [pl.DataFrame(schema=of_run)], [pl.DataFrame(schema=of_row)]
         left = iter(parts)
         while some := list(islice(left, ROWS_AT_A_TIME)):
-            runs.append(pl.DataFrame([p.run for p in some], schema=RUNS, orient="row"))
-            rows = [row for part in some for row in part.streams]
-            streams.append(pl.DataFrame(rows, schema=STREAM_ROWS, orient="row"))
-        return pl.concat(runs, rechunk=True), pl.concat(streams, rechunk=True)
+            runs.append(pl.DataFrame([p.run for p in some], schema=of_run, orient="row"))
+            several = [row for part in some for row in part.rows]
+            rows.append(pl.DataFrame(several, schema=of_row, orient="row"))
+        return pl.concat(runs, rechunk=True), pl.concat(rows, rechunk=True)
 
-    def write_tables(self, runs: pl.DataFrame, streams: pl.DataFrame, markdown: str) -> None:
-        """Writes ``runs.parquet``, ``streams.parquet`` and ``tables.md``."""
+    def write_tables(self, runs: pl.DataFrame, rows: pl.DataFrame, markdown: str) -> None:
+        """Writes ``runs.parquet``, ``streams.parquet`` or ``sites.parquet``, and ``tables.md``."""
         write_parquet(self.folder / "runs.parquet", runs)
-        write_parquet(self.folder / "streams.parquet", streams)
+        write_parquet(self.folder / f"{self._tables.rows}.parquet", rows)
         write_text(self.folder / "tables.md", markdown)
         found = self._description() or {}
         asked = {**found, **_plain(_asked(self._study))}
@@ -186,7 +224,7 @@ class Store:
         found = self._description() or {}
         return "scenario" in found and found["scenario"] != _plain(_scenario_of(self._study))
 
-    def count_of_others(self, specs: Iterable[RunSpec]) -> int:
+    def count_of_others(self, specs: Iterable[Spec]) -> int:
         """Returns how many runs are kept that are none of the given ones."""
         asked = {spec.run_id for spec in specs}
         return sum(p.stem not in asked for p in (self.folder / PARTS).glob("*.json"))
@@ -205,29 +243,31 @@ def _plain(data: Any) -> Any:
 def _scenario_of(study: Study) -> Row | None:
     """The study's scenario as it is, None where it is valid only with what the study sets."""
     try:
+        if is_corridor(study.source):
+            return load_corridor(study.source).as_data()
         return load_scenario(study.source).model_dump(mode="json")
     except CorampError:
         return None
 
 
-def _part_in(path: Path) -> Part | None:
+def _part_in(path: Path, tables: Tables) -> Part | None:
     """The part in a file, None if it is missing, damaged or of another run than its name says."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        run, streams = content["run"], content["streams"]
-        if content["sha256"] != _checksum(run, streams) or run["run_id"] != path.stem:
+        run, rows = content["run"], content[tables.rows]
+        if content["sha256"] != _checksum(run, rows) or run["run_id"] != path.stem:
             return None
-        if not {"status", *RUN_KEYS} <= run.keys() <= RUNS.keys():
+        if not {"status", *RUN_KEYS} <= run.keys() <= tables.runs.keys():
             return None
-        if any(not {"run_id", "stream"} <= row.keys() <= STREAM_ROWS.keys() for row in streams):
+        if any(not {"run_id", tables.by} <= row.keys() <= tables.row.keys() for row in rows):
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-    return Part(_decoded(run), [_decoded(row) for row in streams])
+    return Part(_decoded(run), [_decoded(row) for row in rows])
 
 
-def _checksum(run: Row, streams: list[Row]) -> str:
-    text = json.dumps([run, streams], sort_keys=True)
+def _checksum(run: Row, rows: list[Row]) -> str:
+    text = json.dumps([run, rows], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

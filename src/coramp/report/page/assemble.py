@@ -11,6 +11,7 @@ from typing import Any
 import jinja2
 
 from coramp.records.run import RunRecords
+from coramp.records.schemas import Row
 from coramp.report.page.shown import page_data
 from coramp.scenarios.model import Scenario
 
@@ -56,6 +57,18 @@ def assembled(
     )
 
 
+def plain(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
+    """Returns a page without the scripts of one merge site's runs, with the named ones alone."""
+    return rendered(
+        template,
+        styles=[asset(name) for name in STYLES],
+        library="",
+        scripts="\n".join(asset(name) for name in scripts),
+        cells=[],
+        **values,
+    )
+
+
 def rendered(template: str, **values: Any) -> str:
     """Returns a template with its values in it."""
     return _environment().get_template(template).render(**values) + "\n"
@@ -81,5 +94,10 @@ def _environment() -> jinja2.Environment:
 
 def packed(run: RunRecords) -> str:
     """Returns a run as the page unpacks it: base64 of gzipped JSON; the same run, the same text."""
-    text = json.dumps(page_data(run), separators=(",", ":"), allow_nan=False)
+    return packed_data(page_data(run))
+
+
+def packed_data(data: Row) -> str:
+    """Returns plain data as a page unpacks it."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

@@ -1,9 +1,11 @@
 """How results show themselves in a notebook: a summary, and a picture that can be played with."""
 
 import polars as pl
+from matplotlib.figure import Figure
 
 from coramp.records.run import RunRecords
 from coramp.report.page.assemble import rendered
+from coramp.report.page.corridor_study_page import DELAYS
 from coramp.report.page.pages import answer, comparison_table, notes, replay_page
 from coramp.report.page.shown import title_of
 from coramp.report.page.study_page import pictures_of
@@ -29,6 +31,12 @@ def run_html(run: RunRecords) -> str:
 def study_html(tables: tuple[Table, ...], layout: str, runs: pl.DataFrame) -> str:
     """Returns a study's tables and the figures that its layout has."""
     return _notebook(tables=tables, pictures=pictures_of(layout, runs.filter(status="ok")))
+
+
+def corridor_study_html(tables: tuple[Table, ...], figure: Figure | None) -> str:
+    """Returns a corridor's study: its tables, and the figure of delays by site if there is one."""
+    shown = [] if figure is None else [picture(DELAYS, figure)]
+    return _notebook(tables=tables, pictures=shown)
 
 
 def plan_html(planned: PlannedSnapshot) -> str:

@@ -55,6 +55,24 @@ coramp.windscreen = (ctx, run, i, m, high) => {
   ctx.roundRect(-back, -0.36 * high, (cab ? 0.7 : 0.16 * run.length[i]) * m, 0.72 * high, 0.1 * high);
 };
 
+// Lanes as they lie: their marks, and on these the asphalt, in a colour by lane. ``toPx`` gives the
+// pixels of a place, ``scale`` pixels a metre; no lane is narrower than ``least`` pixels.
+coramp.drawLanes = (ctx, shapes, toPx, scale, colourOf, least = 0) => {
+  const line = (shape, width, colour) => {
+    ctx.strokeStyle = coramp.colour(colour);
+    ctx.lineWidth = Math.max(width * scale, least);
+    ctx.lineJoin = 'round';
+    ctx.beginPath();
+    for (let k = 0; k < shape.xy.length; k += 2) {
+      const [x, y] = toPx({ x: shape.xy[k], y: shape.xy[k + 1] });
+      if (k === 0) ctx.moveTo(x, y); else ctx.lineTo(x, y);
+    }
+    ctx.stroke();
+  };
+  shapes.forEach((shape) => line(shape, shape.width + 0.5, 'mark'));
+  shapes.forEach((shape) => line(shape, shape.width - 0.3, colourOf(shape)));
+};
+
 // The legend of the replay; ``run`` says how fast one drives there.
 coramp.replayLegend = (run, cooperative, mixed, runs = [run]) => {
   const { element } = coramp;

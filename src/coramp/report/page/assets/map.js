@@ -74,21 +74,8 @@ coramp.Road = class extends coramp.Road {
   }
 
   drawShapes(ctx) {
-    const line = (shape, width, colour) => {
-      ctx.strokeStyle = coramp.colour(colour);
-      ctx.lineWidth = width * this.scale;
-      ctx.lineJoin = 'round';
-      ctx.beginPath();
-      for (let k = 0; k < shape.xy.length; k += 2) {
-        const [x, y] = this.toPx({ x: shape.xy[k], y: shape.xy[k + 1] });
-        if (k === 0) ctx.moveTo(x, y); else ctx.lineTo(x, y);
-      }
-      ctx.stroke();
-    };
-    const { shapes } = this.run.road;
-    shapes.forEach((shape) => line(shape, shape.width + 0.5, 'mark'));
-    shapes.forEach((shape) => line(shape, shape.width - 0.3,
-      shape.lane === -1 && shape.from >= 0 ? 'asphalt-lane' : 'asphalt'));
+    coramp.drawLanes(ctx, this.run.road.shapes, this.toPx, this.scale,
+      (shape) => (shape.lane === -1 && shape.from >= 0 ? 'asphalt-lane' : 'asphalt'));
   }
 
   x(row, station) { return this.atOrigin ? 0 : super.x(row, station); }

@@ -143,11 +143,14 @@ coramp.element = (tag, attributes = {}, ...children) => {
   return element;
 };
 
-// A run that lies in the page: base64 of gzipped JSON, unpacked when it is first shown.
-coramp.unpacked = async (element) => {
+// Data that lie in the page: base64 of gzipped JSON.
+coramp.data = (element) => {
   const bytes = Uint8Array.from(atob(element.textContent.trim()), (c) => c.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
-  return coramp.runOf(await new Response(stream).json());
+  return new Response(stream).json();
 };
+
+// A run that lies in the page, unpacked when it is first shown.
+coramp.unpacked = async (element) => coramp.runOf(await coramp.data(element));
 
 coramp.number = (value, digits = 2) => (value === null ? '–' : value.toFixed(digits));
