@@ -22,7 +22,7 @@ from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
 from coramp.road.lanes import MAINLINE, RAMP
 from coramp.road.rules import Rules, packed, unpacked
-from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.loading import check_one_lane, load_scenario
 from coramp.strategies.base import (
     Decider,
     Decision,
@@ -135,6 +135,7 @@ class MergeEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._scenario = load_scenario(
             scenario, {**{k: float(v) for k, v in flows.items()}, "simulation.horizon_s": horizon_s}
         )
+        check_one_lane(self._scenario, "the environment plans", "coramp/MixedMerge-v0")
         if self._scenario.vehicles_differ:
             raise CorampError(
                 f"vehicle: the environment is for vehicles that are alike; those of {scenario} are "

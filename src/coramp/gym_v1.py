@@ -22,7 +22,7 @@ from coramp.kinematics.trajectory import station_and_speed
 from coramp.messages.feed import RequestFeed
 from coramp.metrics.delay_bound import earliest_exits_s, first_come_exits_s, lane_headway_s
 from coramp.road.rules import Rules, packed
-from coramp.scenarios.loading import load_scenario
+from coramp.scenarios.loading import check_one_lane, load_scenario
 from coramp.strategies.asked_slot import crossings_around
 from coramp.strategies.base import steps_of_period
 
@@ -102,6 +102,7 @@ class MergeSlots(gymnasium.Env[Floats32, Floats32]):
             "simulation.horizon_s": horizon_s,
         }
         self._scenario = load_scenario(scenario, {k: float(v) for k, v in settings.items()})
+        check_one_lane(self._scenario, "the environment plans", "coramp/MixedMerge-v0")
         if self._scenario.vehicles_differ:
             raise CorampError(
                 f"vehicle: the environment is for vehicles that are alike; those of {scenario} are "

@@ -11,6 +11,7 @@ from coramp.demand.arrivals import arrivals_of
 from coramp.demand.counts import read_counts
 from coramp.errors import CorampError
 from coramp.scenarios.loading import load_scenario
+from coramp.worlds.sumo.detected import detected
 from tests.edges import assert_refused, invoke
 
 INTERVALS = 3
@@ -21,6 +22,21 @@ COUNTED = {
     ("R", "truck"): (1, 2, 0),
 }
 """A peak, and trucks."""
+ROAD = """
+[mainline]
+start_m = -400.0
+end_m = 400.0
+speed_mps = 27.78
+lanes = 2
+[ramp]
+start_m = -300.0
+speed_mps = 20.0
+acceleration_lane_m = 200.0
+[[demand]]
+route = "mainline"
+end_s = 60.0
+vehicles = 1
+"""
 KEYS = ["begin_s", "end_s", "detector", "vehicle_class"]
 
 
@@ -139,8 +155,32 @@ def test_a_part_of_a_file(here):
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (("--detector", "M"), "--detector: M: is not ID=STATION; an example is M=-350"),
-        (("--detector", "M=x"), "--detector: M=x: is not ID=STATION; an example is M=-350"),
+        *(
+            (
+                ("--detector", text),
+                (
+                    f"--detector: {text}: is not ID=STATION; "
+                    "allowed are metres from the nose, as in M=-350"
+                ),
+            )
+            for text in ("M", "M=x", "M=nan", "M=-0,35")
+        ),
+        (
+            ("--detector", "M=-9", "--detector", "M=-8"),
+            "--detector: M is given twice; allowed is once",
+        ),
+        (
+            ("--detector", "M=300"),
+            (
+                "--detector: M=300: is not on the mainline upstream of the nose; "
+                "allowed is above -400 to 0 m"
+            ),
+        ),
+        (
+            ("--detector", "R=-900"),
+            "--detector: R=-900: is not on the ramp; allowed is above -400 to 0 m",
+        ),
+        (("--class", "bus=truck"), "--class: c.csv has no class 'bus'; allowed are car, truck"),
         (
             ("--class", "bus=coach"),
             "--class: bus=coach: is not CLASS=TYPE; allowed types are car, truck",
@@ -148,7 +188,7 @@ def test_a_part_of_a_file(here):
         (("--ramp", "x@y"), "--ramp: is an on-ramp of a network; allowed with --net or --osm"),
         (
             ("--detector", "M=-500"),
-            ("s.toml: demand.0.station_m: -500 is not on the mainline; allowed is -400 to 400 m"),
+            "--detector: M=-500: is not on the mainline; allowed is above -400 to 0 m",
         ),
     ],
 )
@@ -235,3 +275,83 @@ def test_a_scenario_with_counts_is_printed_as_it_is_taken(here):
     assert "# [[vehicle]]: car, truck, listed in the file" in lines
     assert "# [[detector]]: M, R, listed in the file" in lines
     assert any(line.startswith("# [counts]: c.csv, at M and ") for line in lines)
+
+
+def test_a_detector_of_both_roads_and_one_with_a_blank(here):
+    told = invoke("new-scenario", "s", "--counts", "c.csv", "--mainline-detector", "M",
+                  "--ramp-detector", "M")  # fmt: skip
+    assert told.errors == [
+        "Error: --ramp-detector: M is the --mainline-detector; allowed is another one"
+    ]
+    (here / "c.csv").write_text(rows().replace(",M,", ",M 1,"))
+    told = invoke("new-scenario", "s", "--counts", "c.csv", "--mainline-detector", "M 1",
+                  "--ramp-detector", "R")  # fmt: skip
+    assert told.errors == [
+        (
+            "Error: s.toml: counts.mainline: 'M 1' cannot be; "
+            "allowed is a name without spaces and without < > & \" ' , ;"
+        )
+    ]
+    assert not (here / "s.toml").exists()
+
+
+def test_what_detectors_have_wrong_is_told_by_road_and_once(here):
+    assert new().code == 0
+    text = (here / "s.toml").read_text().replace("station_m = -350.0", "station_m = 100.0", 1)
+    (here / "s.toml").write_text(text)
+    with pytest.raises(CorampError) as caught:
+        load_scenario("s.toml")
+    assert caught.value.messages == (
+        "s.toml: counts.mainline: station_m: 100 is not on the mainline; allowed is -400 to 0 m",
+    )
+    lanes = [line + (",1" if ",R," in line else ",0") for line in rows().splitlines()[1:]]
+    (here / "c.csv").write_text("begin_s,end_s,detector,class,vehicles,lane\n" + "\n".join(lanes))
+    told = new(name="t")
+    assert told.errors == [
+        "Error: t.toml: counts.ramp: lane: the ramp has no lane 1; allowed is up to 0"
+    ]
+
+
+def test_a_first_interval_that_ends_before_anybody_can_pass(here):
+    (here / "road.toml").write_text(ROAD.replace("start_m = -400.0", "start_m = -2000.0"))
+    lines = [f"{60 * k},{60 * k + 60},{d},3" for k in range(3) for d in "MR"]
+    (here / "c.csv").write_text("\n".join(["begin_s,end_s,detector,vehicles", *lines]))
+    assert new("--road", "road.toml", "--detector", "M=-1000").code == 0
+    told = new("--road", "road.toml", "--detector", "M=-100", name="t")
+    (line,) = told.errors
+    assert line.startswith(
+        "Error: t.toml: counts.mainline: 2 vehicles are to pass -100 m by 60 s, and the first "
+    )
+    assert line.endswith("allowed are a station nearer to the entry, or a longer first interval")
+    assert not (here / "t.toml").exists()
+
+
+def test_a_scenario_may_be_named_as_its_file(here):
+    assert new(name="s.toml").code == 0
+    assert load_scenario("s.toml").name == "s"
+    assert new(name="").errors == [
+        "Error: name: '' is none; allowed is the name of a file, like a10"
+    ]
+
+
+def test_counts_by_lane_are_seen_again_on_their_lanes(here):
+    (here / "road.toml").write_text(ROAD)
+    by_lane = {("M", 0): (40, 60), ("M", 1): (55, 85), ("R", 0): (12, 20)}
+    (here / "c.csv").write_text(
+        "begin_s,end_s,detector,lane,class,vehicles\n"
+        + "".join(
+            f"{300 * k},{300 * k + 300},{d},{lane},{kind},{n}\n"
+            for (d, lane), counts in by_lane.items()
+            for k, total in enumerate(counts)
+            for kind, n in (("car", total - total // 10), ("truck", total // 10))
+        )
+    )
+    assert new("--road", "road.toml").code == 0
+    scenario = load_scenario("s.toml")
+    assert scenario.detector[0].station_m == -399.0  # nobody changes lanes before it
+    found = detected(scenario, scenario.drivers["credible"], seed=77)
+    keys = ["begin_s", "detector", "lane", "vehicle_class"]
+    both = read_counts("c.csv").frame.join(found, on=keys)
+    assert both.height == 12
+    assert (both["vehicles"] - both["vehicles_right"]).abs().max() <= 1
+    assert both["vehicles"].sum() == both["vehicles_right"].sum() == 272

@@ -225,12 +225,15 @@ def test_a_gap_of_the_whole_file(file):
 def test_a_decimal_comma(file):
     text = table("0;300;M;0;car;10;24,5", head=HEAD.replace(",", ";"))
     assert told(file(text)) == [
-        "row 2: mean_speed_mps is '24,5', with a decimal comma; allowed is a decimal point"
+        (
+            "row 2: mean_speed_mps is '24,5', with a decimal comma; "
+            "allowed is a decimal point in every row"
+        )
     ]
     counts = read_counts(file(text), repair=True)
     assert counts.frame["mean_speed_mps"].to_list() == [24.5]
     assert [repair.line("f") for repair in counts.repairs] == [
-        "f: row 2: mean_speed_mps is '24,5', with a decimal comma: taken as a point"
+        ("f: row 2: mean_speed_mps is '24,5', with a decimal comma: taken as a point in every row")
     ]
 
 
@@ -409,3 +412,155 @@ def test_a_row_that_lies_years_away_is_one_gap(file):
 def test_more_than_a_lane_carries_even_in_a_short_last_interval(file):
     rows = ["0,300,M,0,car,1,20", "300,330,M,0,car,99999999999999999999,20"]
     assert told(file(table(*rows)), repair=True)[0].startswith("row 3: 1e+20 vehicles in 30 s")
+
+
+@pytest.mark.parametrize(
+    ("word", "taken"),
+    [
+        ("1.234,0", 1234),
+        ("1'234", 1234),
+        ("1\u2019234", 1234),
+        ("1\u00a0234", 1234),
+        ("1 234", 1234),
+    ],
+)
+def test_thousands_separators_of_spreadsheets(file, word, taken):
+    path = file(f"begin_s;end_s;detector;vehicles\n0;3600;M;{word}\n3600;7200;M;10\n")
+    (line,) = told(path)
+    assert line.startswith(
+        f"row 2: vehicles is {word!r}, with a thousands separator; allowed is 1234"
+    )
+    assert vehicles(read_counts(path, repair=True)) == [taken, 10]
+
+
+@pytest.mark.parametrize("word", ["1,234", "1.234"])
+def test_what_may_be_thousands_or_decimals_is_never_guessed(file, word):
+    path = file(f"begin_s;end_s;detector;vehicles\n0;3600;M;{word}\n3600;7200;M;10\n")
+    line = (
+        f"row 2: vehicles is {word!r}, with a thousands separator or decimals; "
+        "allowed is a number without thousands separators and decimal commas"
+    )
+    assert told(path) == told(path, repair=True) == [line]
+
+
+def test_decimal_commas_and_kmh_are_told_once_a_file(file):
+    head = HEAD.replace(",", ";")
+    rows = [f"{300 * k};{300 * k + 300};M;0;car;10;24,{k}" for k in range(12)]
+    path = file(table(*rows, head=head))
+    assert len(told(path)) == 1
+    assert len(read_counts(path, repair=True).repairs) == 1
+    rows = [f"{300 * k},{300 * k + 300},M,0,car,10,9{k % 9}" for k in range(12)]
+    assert told(file(table(*rows))) == [
+        (
+            "row 2: a mean speed of 90 m/s; allowed is up to 55 m/s; "
+            "speeds in km/h belong into mean_speed_kmh"
+        )
+    ]
+
+
+def test_vehicles_of_an_interval_as_an_hourly_flow(file):
+    rows = [f"{300 * k},{300 * k + 300},M,{n}" for k, n in enumerate((20, 25, 24, 31))]
+    path = file(table(*rows, head="begin_s,end_s,detector,flow_veh_h"))
+    assert told(path) == [
+        (
+            "row 2: 20 veh/h are 1.66667 vehicles in 300 s; allowed are whole numbers of vehicles "
+            "in every row; counts of an interval belong into the column vehicles"
+        )
+    ]
+    assert vehicles(read_counts(path, repair=True)) == [2, 2, 2, 2]  # of 1.67, 2.08, 2, 2.58
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (b"PK\x03\x04rest", "is a spreadsheet or packed (zip); "),
+        (b"\x1f\x8b\x08rest", "is packed (gzip); "),
+        (b"time,detector,vehicles\n0,M\x00,1\n", "row 2: byte 0x00 is no text; "),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "row 2: byte 0x1a is no text; "),
+        ("time,detector\n".encode("utf-16-le"), "is encoded in UTF-16 without its mark; "),
+        (b'<?xml version="1.0" encoding="none"?><routes/>', "row 1: unknown encoding: none; "),
+    ],
+)
+def test_what_is_no_text_is_one_line(file, content, line):
+    first, *others = told(file(content))
+    assert first.startswith(line)
+    assert "allowed is " in first
+    assert not others or "UTF-16" in first
+
+
+def test_any_line_end_and_the_row_that_names_the_separator(file):
+    plain = read_counts(file(table(*ROWS))).frame
+    for end in ("\r", "\r\n"):
+        assert read_counts(file(table(*ROWS).replace("\n", end).encode())).frame.equals(plain)
+    text = "sep=;\n" + table(*ROWS).replace(",", ";")
+    assert read_counts(file(text)).frame.equals(plain)
+    unmarked = read_counts(file(table(*ROWS).encode("utf-16-le")), repair=True)
+    assert unmarked.frame.equals(plain)
+
+
+def test_days_of_a_spreadsheet_are_no_seconds(file):
+    rows = ("46153.2916666667,M,1", "46153.2951388889,M,2")
+    (line,) = told(file(table(*rows, head="time,detector,vehicles")))
+    assert line.startswith("row 2: time is '46153.2916666667', a spreadsheet's number of days; ")
+
+
+def test_times_without_a_date_over_midnight(file):
+    rows = [
+        f"{time},{name},{k}" for name in "MR" for k, time in enumerate(("23:50", "23:55", "00:00"))
+    ]
+    path = file(table(*rows, head="time,detector,vehicles"))
+    assert told(path) == [
+        "row 4: time 00:00 comes after 23:55, as behind midnight; allowed are stamps with a date"
+    ]
+    counts = read_counts(path, repair=True)
+    assert vehicles(counts) == vehicles(counts, "R") == [0, 1, 2]
+    assert (counts.begin_s, counts.end_s) == (0.0, 900.0)
+
+
+@pytest.mark.parametrize("values", [[[1], [2]], [{"a": 1}, {"a": 2}], [True, False], [b"1", b"2"]])
+def test_parquet_with_columns_that_are_no_numbers(tmp_path, values):
+    frame = pl.DataFrame({"time": [0, 300], "detector": ["M", "M"], "vehicles": values})
+    frame.write_parquet(tmp_path / "a.parquet")
+    (line,) = told(tmp_path / "a.parquet")
+    assert line.startswith("column vehicles is of type ")
+    assert line.endswith("; allowed are numbers, text, dates and times")
+
+
+def flow(**values):
+    given = {"id": "f", "begin": "0", "end": "300", "from": "a", "number": "30", **values}
+    return "<routes><flow " + " ".join(f'{k}="{v}"' for k, v in given.items() if v) + "/></routes>"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (flow(end=""), "row 1: end is missing; allowed is a finite number"),
+        (flow(begin="soon"), "row 1: begin is 'soon'; allowed is a finite number"),
+        (flow(end="1e300"), "row 1: end is 1e+300 s; allowed is 0 to 2678400 s"),
+        (
+            flow(number=""),
+            "row 1: the flow has no number; allowed are number, vehsPerHour or period",
+        ),
+        (
+            '<routes><trip id="1" depart="1e300" from="a" to="b"/></routes>',
+            "row 1: depart is 1e+300 s; allowed is 0 to 2678400 s",
+        ),
+        (
+            '<routes><trip id="1" depart="triggered" from="a" to="b"/></routes>',
+            "row 1: depart is 'triggered'; allowed is a finite number",
+        ),
+        (
+            '<detector><interval begin="0" end="300" nVehContrib="7"/></detector>',
+            "row 1: the interval has no id; allowed is that of its loop",
+        ),
+    ],
+)
+def test_sumo_s_files_that_cannot_be(file, text, line):
+    assert told(file(text, "a.xml")) == [line]
+
+
+def test_sumo_s_times_with_colons_and_files_in_utf_16(file):
+    text = flow(begin="0:00:00", end="0:05:00")
+    assert read_counts(file(text, "a.xml")).end_s == 300.0
+    head = '<?xml version="1.0" encoding="utf-16"?>'
+    assert vehicles(read_counts(file((head + text).encode("utf-16"), "b.xml")), "a") == [30]

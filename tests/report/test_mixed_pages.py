@@ -6,7 +6,8 @@ import pytest
 import coramp
 from coramp.records.lapses import FALLBACK, UNKNOWN, lapses_in
 from coramp.records.world_told import told_of_world
-from coramp.report.page.pages import asked_table, comparison_table, notes
+from coramp.report.page.asked import asked_table
+from coramp.report.page.pages import comparison_table, notes
 from coramp.report.page.shown import page_data
 from coramp.report.time_space_figure import AUTOMATED_COLOUR
 from coramp.report.writing import replay, report

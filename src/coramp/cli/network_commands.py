@@ -120,7 +120,10 @@ def new_scenario(
     """
     from coramp.cli.new_scenario import Asked, write_asked
 
-    target = Path(f"{name}.toml")
+    stem = name.removesuffix(".toml")
+    if not Path(stem).name.strip(". "):
+        raise CorampError(f"name: {name!r} is none; allowed is the name of a file, like a10")
+    target = Path(f"{stem}.toml")
     if target.exists():
         raise CorampError(f"{target}: is there already; give another name, or move it away")
     asked = Asked(

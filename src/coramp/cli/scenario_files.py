@@ -11,6 +11,7 @@ from typing import Any
 import sumo
 import tomli_w
 
+from coramp.demand.arrivals import arrivals_of
 from coramp.errors import CorampError
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
@@ -65,6 +66,8 @@ def new_scenario_data(
     return data
 
 
+FIRST_SEED = 1
+"""With it is tried whether vehicles can come as they were counted."""
 HEAD = "Lengths, lanes and limits are those of the network; set the flows and what else you need."
 COUNTED = "The demand is that of the counts; detectors and shares of types follow from them."
 FIRST = ("name", "description", "network", "mainline", "ramp")
@@ -78,7 +81,12 @@ def new_scenario_text(data: Mapping[str, Any], target: Path) -> str:
     data = {"name": target.stem, **data}
     label = str(target)
     complete = with_demand_flows(with_counts(with_populations(data), label, {}), label, {})
-    validated(Scenario, with_defaults(complete, label), label)
+    scenario = validated(Scenario, with_defaults(complete, label), label)
+    if COUNTS in data:
+        try:
+            arrivals_of(scenario, FIRST_SEED)
+        except CorampError as error:
+            raise CorampError(*(f"{label}: {line}" for line in error.messages)) from error
     keys = [*(key for key in FIRST if key in data), *(key for key in data if key not in FIRST)]
     heads = [HEAD] if "network" in data else []
     heads += [COUNTED] if COUNTS in data else []
@@ -142,4 +150,7 @@ def _convert(command: list[str], osm: Path, built: Path) -> None:
     )
     if done.returncode != 0 or not built.exists():
         told = [line for line in done.stderr.splitlines() if line.startswith("Error")]
-        raise CorampError(f"--osm: {osm}: netconvert: {(told or ['failed'])[0]}")
+        raise CorampError(
+            f"--osm: {osm}: netconvert: {(told or ['failed'])[0]}; allowed is an extract of "
+            "OpenStreetMap"
+        )

@@ -117,9 +117,9 @@ def _speeds(lines: list[Line], findings: Findings) -> list[Line]:
         speed = line.mean_speed_mps or 0.0
         what = f"a mean speed of {speed:g} m/s"
         how = f"all speeds of the file taken as km/h, here {speed / KMH:.4g} m/s"
-        if mended and in_kmh:
-            break  # told once: it holds for the file
         mended = findings.tell(line.row, what, allowed, how if in_kmh else "")
+        if in_kmh:
+            break  # told once: it holds for the file
     kept = []
     for line in lines:
         told_mps = line.mean_speed_mps

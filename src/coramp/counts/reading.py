@@ -4,7 +4,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import date, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ from coramp.errors import CorampError
 
 PARQUET = b"PAR1"
 XML = b"<"
+BEFORE_XML = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+"""Marks of encodings, and what is left blank."""
 ROOM = 50.0
 """So many vehicles may be on the way between detectors."""
 
@@ -119,7 +121,7 @@ def _check_known(names: Sequence[str], lines: Sequence[Line], path: Path) -> Non
 def _lines_of(content: bytes, findings: Findings) -> Read:
     if content.startswith(PARQUET):
         return lines_of_table(_words_of_parquet(content), findings)
-    if content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(XML):
+    if content.lstrip(BEFORE_XML).startswith(XML):
         return lines_of_xml(content, findings), None
     words = words_of(text_of(content, findings))
     return lines_of_table(words, findings)
@@ -131,6 +133,11 @@ def _words_of_parquet(content: bytes) -> Words:
         frame = pl.read_parquet(io.BytesIO(content))
     except (OSError, pl.exceptions.PolarsError) as error:
         raise CorampError(f"cannot be read: {error}; allowed is a whole Parquet file") from error
+    for name, kind in frame.schema.items():
+        if kind.is_nested() or kind in (pl.Binary, pl.Object, pl.Boolean):
+            raise CorampError(
+                f"column {name} is of type {kind}; allowed are numbers, text, dates and times"
+            )
     rows = [[_word(value) for value in row] for row in frame.iter_rows()]
     return [(0, frame.columns), *enumerate(rows, 1)]
 
@@ -140,6 +147,8 @@ def _word(value: Any) -> str:
         return ""
     if isinstance(value, datetime | date):
         return value.isoformat()
+    if isinstance(value, timedelta):
+        value = value.total_seconds()
     if isinstance(value, float) and math.isfinite(value) and value == int(value):
         return str(int(value))
     return str(value)

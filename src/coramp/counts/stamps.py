@@ -9,6 +9,7 @@ from coramp.counts.table import Findings
 FORMATS = ("%d.%m.%Y %H:%M", "%d.%m.%Y %H:%M:%S")
 ALLOWED = "are seconds, or stamps like 2026-05-11 07:15 or 07:15:00, with or without +02:00"
 HOUR = timedelta(hours=1)
+HALF_A_DAY = timedelta(hours=12)
 CHANGED_AT = (1, 2, 3)
 """On Sundays, clocks are changed at one of these hours."""
 NO_DATE = datetime(1970, 1, 1).date()
@@ -47,10 +48,32 @@ def without_clock_changes(
     thing.
     """
     kept = list(stamps)
-    if not kept or kept[0].tzinfo is not None or kept[0].date() == NO_DATE:
+    if not kept or kept[0].tzinfo is not None:
         return kept
+    if kept[0].date() == NO_DATE:
+        return _over_midnight(kept, streams, rows, findings)
     kept = _without_twice(kept, streams, rows, findings)
     return _without_missing(kept, rows, findings)
+
+
+def _over_midnight(
+    stamps: list[datetime], streams: Sequence[Stream], rows: Sequence[int], findings: Findings
+) -> list[datetime]:
+    """Times without a date, of the next day where they come behind midnight."""
+    last: dict[Stream, datetime] = {}
+    days: dict[Stream, timedelta] = {}
+    kept = []
+    for stamp, stream, row in zip(stamps, streams, rows, strict=True):
+        before = last.get(stream, stamp)
+        if before - stamp > HALF_A_DAY:
+            what = f"time {stamp:%H:%M} comes after {before:%H:%M}, as behind midnight"
+            allowed, mended = "are stamps with a date", "taken as of the next day"
+            if not findings.tell_once("midnight", row, what, allowed, mended):
+                return stamps
+            days[stream] = days.get(stream, timedelta()) + timedelta(days=1)
+        last[stream] = stamp
+        kept.append(stamp + days.get(stream, timedelta()))
+    return kept
 
 
 def _without_twice(

@@ -12,8 +12,12 @@ from coramp.errors import CorampError
 
 LOOP, FLOW, TYPE, ROUTE = "interval", "flow", "vType", "route"
 VEHICLES = ("vehicle", "trip")
+TIMES = ("begin", "end", "depart")
+UNITS_S = (1.0, 60.0, 3600.0, 86_400.0)
 COUNTED_S = 300.0
 """Vehicles of a route file are counted in intervals of so many seconds."""
+LATEST_S = 31.0 * 86_400.0
+"""No vehicle comes later: a month."""
 NOT_KNOWN = "DEFAULT_VEHTYPE"
 ALLOWED = "are <interval>, <flow>, <vehicle> and <trip> of SUMO"
 
@@ -36,7 +40,9 @@ def lines_of_xml(content: bytes, findings: Findings) -> list[Line]:
         raise CorampError(
             f"row {row}: is cut off or no XML ({error.getMessage()}); allowed is a whole file"
         ) from None
-    if not reader.lines and not reader.departs:
+    except LookupError as error:
+        raise CorampError(f"row 1: {error}; allowed is UTF-8") from None
+    if not reader.lines and not reader.departs and not findings.problems:
         raise CorampError(f"holds no counts; allowed {ALLOWED}")
     return [*reader.lines, *reader.counted()]
 
@@ -80,12 +86,18 @@ class _Reader(xml.sax.handler.ContentHandler):
             self._open = (row, {**own, "from": first}, kind)
 
     def _number(self, row: int, values: Mapping[str, str], key: str) -> float:
+        if key not in values:
+            self._findings.tell(row, f"{key} is missing", "is a finite number")
+            return math.nan
         try:
-            value = float(values.get(key, "nan"))
+            value = _seconds_of(values[key]) if key in TIMES else float(values[key])
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            self._findings.tell(row, f"{key} is {values.get(key)!r}", "is a finite number")
+            self._findings.tell(row, f"{key} is {values[key]!r}", "is a finite number")
+        elif key in TIMES and not 0.0 <= value <= LATEST_S:
+            self._findings.tell(row, f"{key} is {value:g} s", f"is 0 to {LATEST_S:.0f} s")
+            return math.nan
         return value
 
     def _loop(self, row: int, values: Mapping[str, str]) -> None:
@@ -95,8 +107,10 @@ class _Reader(xml.sax.handler.ContentHandler):
         if "speed" in values:
             told = self._number(row, values, "speed")
             speed_mps = told if told >= 0.0 and vehicles > 0.0 else None
-        if math.isfinite(begin_s) and math.isfinite(end_s):
-            name = values.get("id", "")
+        name = values.get("id", "")
+        if not name:
+            self._findings.tell(row, "the interval has no id", "is that of its loop")
+        elif math.isfinite(begin_s) and math.isfinite(end_s):
             self.lines.append(Line(row, begin_s, end_s, name, None, CAR, vehicles, speed_mps))
 
     def _flow(self, row: int, values: Mapping[str, str]) -> None:
@@ -158,6 +172,12 @@ class _Reader(xml.sax.handler.ContentHandler):
             for stream, of_interval in counts.items()
             for k in range(min(0, *of_interval), last + 1)
         ]  # fmt: skip
+
+
+def _seconds_of(word: str) -> float:
+    """Seconds, or SUMO's times by days, hours, minutes and seconds, separated by colons."""
+    parts = [float(part) for part in word.split(":")]
+    return sum(part * unit for part, unit in zip(reversed(parts), UNITS_S, strict=False))
 
 
 def _class_of(values: Mapping[str, str]) -> str:

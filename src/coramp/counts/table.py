@@ -89,6 +89,7 @@ class Findings:
     repair: bool
     problems: list[Problem] = field(default_factory=list)
     repairs: list[Repair] = field(default_factory=list)
+    _of_the_file: dict[str, bool] = field(default_factory=dict)
 
     def tell(self, row: int, what: str, allowed: str, mended: str = "") -> bool:
         """Notes what is wrong; returns whether to mend it, in the way that ``mended`` says."""
@@ -97,6 +98,12 @@ class Findings:
             return True
         self.problems.append(Problem(row, what, allowed))
         return False
+
+    def tell_once(self, kind: str, row: int, what: str, allowed: str, mended: str = "") -> bool:
+        """Notes what the whole file has wrong, at the first row that shows it; see ``tell``."""
+        if kind not in self._of_the_file:
+            self._of_the_file[kind] = self.tell(row, what, allowed, mended)
+        return self._of_the_file[kind]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -29,6 +30,20 @@ NAMES = "are the columns time or begin_s, end_s, detector or edge, lane, class, 
 NAMES += "flow_veh_h, mean_speed_mps or mean_speed_kmh"
 DFROUTER = ("detector", "time", "qpkw")
 MOST_LANE = 9
+COUNTED = ("vehicles", "flow_veh_h", "qpkw", "qlkw")
+WHOLE = ("vehicles", "qpkw", "qlkw")
+THOUSANDS = (
+    re.compile(r"\d{1,3}(?:\.\d{3})+(?P<rest>,\d+)"),
+    re.compile(r"\d{1,3}(?:,\d{3})+(?P<rest>\.\d+)"),
+    re.compile(r"\d{1,3}(?:\.\d{3}){2,}(?P<rest>)"),
+    re.compile(r"\d{1,3}(?:,\d{3}){2,}(?P<rest>)"),
+    re.compile(r"\d{1,3}(?:['\u2019\s]\d{3})+(?P<rest>(?:[.,]\d+)?)"),
+)
+"""Numbers as spreadsheets show them: 1.234,5 or 1,234.5 or 1'234 or 1 234."""
+TWO_MEANINGS = re.compile(r"\d{1,3}[.,]\d{3}")
+"""A thousands separator or a decimal one."""
+DAYS = (20_000.0, 80_000.0)
+"""Spreadsheets number days; from 1954 to 2119 they have these numbers."""
 KMH = 3.6
 PER_MINUTE = 60.0
 SECONDS_PER_HOUR = 3600.0
@@ -49,7 +64,7 @@ def lines_of_table(words: Words, findings: Findings) -> Read:
     raw = [_Raw(number, row, places, findings) for number, row in rows]
     raw = [line for line in raw if line.is_whole(len(head))]
     begins, start = _begins(raw, findings)
-    ends = _ends(raw, begins, start)
+    ends = _ends(raw, begins, start, findings)
     lines = []
     for line, begin_s, end_s in zip(raw, begins, ends, strict=True):
         if not math.isnan(begin_s) and not math.isnan(end_s):
@@ -131,8 +146,7 @@ class _Raw:
             self._findings.tell(self.number, what, f"are 0 (the rightmost) to {MOST_LANE}")
         if self.has(PER_HOUR):
             flow = self.number_of(PER_HOUR)
-            vehicles = flow * (end_s - begin_s) / SECONDS_PER_HOUR
-            vehicles = round(vehicles) if abs(vehicles - round(vehicles)) < 1e-3 else vehicles
+            vehicles = self._vehicles_of(flow, end_s - begin_s)
         elif self.has(VEHICLES):
             vehicles = self.number_of(VEHICLES)
         else:
@@ -149,6 +163,20 @@ class _Raw:
             self._speed_mps(),
         )
 
+    def _vehicles_of(self, flow_veh_h: float, length_s: float) -> float:
+        """How many vehicles a flow is; fractions are told of the file, if they are not mended."""
+        vehicles = flow_veh_h * length_s / SECONDS_PER_HOUR
+        if not math.isfinite(vehicles):
+            return math.nan
+        if abs(vehicles - round(vehicles)) >= 1e-3 and self._findings.repair:
+            return vehicles
+        if abs(vehicles - round(vehicles)) >= 1e-3:
+            what = f"{flow_veh_h:g} veh/h are {vehicles:g} vehicles in {length_s:g} s"
+            allowed = "are whole numbers of vehicles in every row; "
+            allowed += "counts of an interval belong into the column vehicles"
+            self._findings.tell_once(PER_HOUR, self.number, what, allowed)
+        return float(round(vehicles))
+
     def _speed_mps(self) -> float | None:
         column, unit = (SPEED_MPS, 1.0) if SPEED_MPS in self._places else (SPEED_KMH, KMH)
         if not self.has(column):
@@ -160,12 +188,23 @@ class _Raw:
 def number_in(
     word: str, column: str, row: int, findings: Findings, otherwise: float = math.nan
 ) -> float:
-    """Returns the number that a word is; a decimal comma is told, or mended."""
+    """Returns the number that a word is; decimal commas and thousands are told, or mended."""
     if word == "":
         return otherwise
-    if word.count(",") == 1 and "." not in word:
+    plain = _without_thousands(word)
+    if plain is not None:
+        what = f"{column} is {word!r}, with a thousands separator"
+        if not findings.tell(row, what, f"is {plain}", f"taken as {plain}"):
+            return otherwise
+        word = plain
+    elif TWO_MEANINGS.fullmatch(word) and column in (COUNTED if "," in word else WHOLE):
+        what = f"{column} is {word!r}, with a thousands separator or decimals"
+        findings.tell(row, what, "is a number without thousands separators and decimal commas")
+        return otherwise
+    elif word.count(",") == 1 and "." not in word:
         what = f"{column} is {word!r}, with a decimal comma"
-        if not findings.tell(row, what, "is a decimal point", "taken as a point"):
+        allowed = "is a decimal point in every row"
+        if not findings.tell_once("comma", row, what, allowed, "taken as a point in every row"):
             return otherwise
         word = word.replace(",", ".")
     try:
@@ -176,6 +215,16 @@ def number_in(
         findings.tell(row, f"{column} is {word!r}", "is a finite number")
         return otherwise
     return value
+
+
+def _without_thousands(word: str) -> str | None:
+    """Returns a number without its thousands separators; None where it has none for sure."""
+    for form in THOUSANDS:
+        if found := form.fullmatch(word):
+            rest = found["rest"]
+            whole = re.sub(r"\D", "", word[: len(word) - len(rest)])
+            return whole + rest.replace(",", ".")
+    return None
 
 
 def _begins(raw: Sequence[_Raw], findings: Findings) -> tuple[list[float], datetime | None]:
@@ -192,6 +241,7 @@ def _begins(raw: Sequence[_Raw], findings: Findings) -> tuple[list[float], datet
         else:
             stamps.append((line, stamp))
     if not stamps:
+        _check_seconds(raw, [value for _, value in numbers])
         return [value for _, value in numbers], None
     odd = [line for line, value in numbers if not math.isnan(value)]
     naive = [line for line, stamp in stamps if stamp.tzinfo is None]
@@ -212,6 +262,17 @@ def _begins(raw: Sequence[_Raw], findings: Findings) -> tuple[list[float], datet
     return [seconds.get(id(line), math.nan) for line in raw], start
 
 
+def _check_seconds(raw: Sequence[_Raw], times: Sequence[float]) -> None:
+    """Raises CorampError for numbers of days, as spreadsheets have them."""
+    known = sorted({time for time in times if not math.isnan(time)})
+    steps = [b - a for a, b in pairwise(known)]
+    if steps and DAYS[0] < known[0] and known[-1] < DAYS[1] and min(steps) < 0.5:
+        row, word = raw[0].number, raw[0].word(BEGIN)
+        raise CorampError(
+            f"row {row}: time is {word!r}, a spreadsheet's number of days; allowed {TIMES_ALLOWED}"
+        )
+
+
 def _is_number(word: str) -> bool:
     try:
         float(word.replace(",", "."))
@@ -220,12 +281,16 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _ends(raw: Sequence[_Raw], begins: Sequence[float], start: datetime | None) -> list[float]:
+def _ends(
+    raw: Sequence[_Raw], begins: Sequence[float], start: datetime | None, findings: Findings
+) -> list[float]:
     """When each row ends (s): as told, or by the interval that most rows keep."""
     usual_s = _usual_interval_s(raw, begins)
     if math.isnan(usual_s) and not all(line.has(END) for line in raw):
+        if findings.problems:
+            return [math.nan] * len(raw)  # it only follows from what is told already
         raise CorampError(
-            "row 2: no interval is known, as no detector has two rows; "
+            "row 2: no interval is known, as no detector has rows at two times; "
             "allowed is a column end_s, or two intervals at least"
         )
     ends = []

@@ -13,6 +13,7 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.demand.generators import generator
 from coramp.demand.passing import Clock, Stream
+from coramp.errors import CorampError
 from coramp.networks.limits import limits_along
 from coramp.road.streams import STREAMS
 from coramp.scenarios.demand_sections import DemandPart
@@ -135,9 +136,26 @@ def _of_lane(
         tops_mps = _top_speeds_mps(kinds, draws["top speeds"].random(len(kinds)))
         speeds_mps = draws["entry speeds"].uniform(*road.entry_speed_mps, len(kinds))
         stream = _stream(scenario, on_ramp, group.station_m, kinds, speeds_mps, tops_mps)
+        _check_in_time(scenario, on_ramp, group, stream)
         steps, stream = clock.placed(group.begin_s, group.end_s, stream, draws["arrivals"])
         for step, k in zip(steps.tolist(), stream.number.tolist(), strict=True):
             yield Drawn(step, float(speeds_mps[k]), kinds[k], float(tops_mps[k]), lane)
+
+
+def _check_in_time(scenario: Scenario, on_ramp: bool, group: Group, stream: Stream) -> None:
+    """Raises CorampError where the first who enter reach a station only behind their interval."""
+    road = scenario.ramp if on_ramp else scenario.mainline
+    first_s, count = float(stream.way_s.min()), len(stream.number)
+    if first_s + (count - 1) * road.min_headway_s < group.end_s:
+        return
+    where = f"demand on the {STREAMS[on_ramp]}"
+    if scenario.counts is not None:
+        where = f"counts.{STREAMS[on_ramp]}"
+    raise CorampError(
+        f"{where}: {count} vehicles are to pass {group.station_m:g} m by {group.end_s:g} s, "
+        f"and the first takes {first_s:.1f} s from its entry at {road.start_m:g} m; allowed are "
+        "a station nearer to the entry, or a longer first interval"
+    )
 
 
 def _top_speeds_mps(kinds: Sequence[VehicleType], draws: FloatArray) -> FloatArray:

@@ -114,8 +114,8 @@ def _scenario_file(name: str) -> str:
 
 
 def _flows(content: Row) -> list[str]:
-    """The options that give the flows; there are none where arrivals are listed."""
-    if content["specification"].get("arrivals"):
+    """The options that give the flows; there are none where the scenario says who comes when."""
+    if any(content["specification"].get(key) for key in ("arrivals", "demand")):
         return []
     pairs = (("--mainline", "mainline_veh_h"), ("--ramp", "ramp_veh_h"))
     return [word for option, key in pairs for word in (option, f"{content[key]:.12g}")]

@@ -26,7 +26,6 @@ from coramp.scenarios.population_files import is_population_file, read_populatio
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
-from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M, run_cooperative
@@ -155,11 +154,13 @@ def make_spec(
         blame = dict.fromkeys(blame, blamed)
     drivers, populations = _drivers_asked(drivers)
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame, populations)
-    _check_types(loaded, chosen)
+    among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
+    plans_ahead = loaded.has_one_lane and not (among_drivers and coordinates_drivers(chosen))
+    if plans_ahead:  # elsewhere each vehicle's own limits bind it as it drives
+        check_vehicles_may_differ(loaded, chosen.name)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:
         raise CorampError(loaded.drift_problem)
     population = None
-    among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
     if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
         check_metering(loaded, chosen, population)
@@ -186,15 +187,6 @@ def _drivers_asked(drivers: str | None) -> tuple[str | None, dict[str, Any]]:
         return drivers, {}
     name, table = read_population(drivers)
     return name, {name: table}
-
-
-def _check_types(scenario: Scenario, strategy: type[Strategy]) -> None:
-    """Raises CorampError for types of vehicles that a strategy cannot plan for.
-
-    Among drivers nothing is planned ahead: there each vehicle's own limits bind it as it drives.
-    """
-    if not (scenario.is_mixed and coordinates_drivers(strategy)):
-        check_vehicles_may_differ(scenario, strategy.name)
 
 
 def stored_spec(content: Row, scenario: Scenario) -> RunSpec:

@@ -1,5 +1,6 @@
 """A new scenario whose demand is a file of counts."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,8 @@ from coramp.scenarios.vehicle_types import BUILT_IN
 
 FROM_ENTRY_M, MOST_OF_ROAD = 50.0, 0.25
 """So far behind the entry a detector is taken to be where nothing is said, on a short road less."""
+BY_LANE_M = 1.0
+"""So far where each of several lanes was counted."""
 SIMULATION, HORIZON = "simulation", "horizon_s"
 NOT_TAKEN = ("name", "description", LIST, DEMAND, COUNTS, DETECTORS, "drivers")
 """What a new scenario does not take over from the one whose road it has."""
@@ -46,11 +49,17 @@ def stations_of(texts: list[str]) -> dict[str, float]:
     for text in texts:
         name, _, station = text.rpartition("=")
         try:
-            found[name] = float(station)
+            station_m = float(station)
         except ValueError:
-            name = ""
-        if not name:
-            raise CorampError(f"--detector: {text}: is not ID=STATION; an example is M=-350")
+            station_m = math.nan
+        if not name or not math.isfinite(station_m):
+            raise CorampError(
+                f"--detector: {text}: is not ID=STATION; allowed are metres from the nose, "
+                "as in M=-350"
+            )
+        if name in found:
+            raise CorampError(f"--detector: {name} is given twice; allowed is once")
+        found[name] = station_m
     return found
 
 
@@ -93,6 +102,7 @@ def with_counts_tables(
             raise CorampError(
                 f"{option}: {choice.file} has no detector {detector!r}; allowed are {known}"
             )
+    _check_choice(data, choice, counts)
     result = {key: value for key, value in data.items() if key not in (*FLOWS, DEMAND)}
     for stream in STREAMS:
         result[stream] = {key: v for key, v in data[stream].items() if key not in FLOWS}
@@ -111,8 +121,30 @@ def with_counts_tables(
         result[COUNTS]["repair"] = True
     if types := _types(counts, choice):
         result["vehicle"] = types
-    result[DETECTORS] = _detectors(data, choice, counts.interval_s)
+    result[DETECTORS] = _detectors(data, choice, counts)
     return result, counts.repairs
+
+
+def _check_choice(data: Mapping[str, Any], choice: CountsChoice, counts: Counts) -> None:
+    """Raises CorampError for detectors that cannot be where they are said to be, and others."""
+    if choice.mainline == choice.ramp:
+        raise CorampError(
+            f"--ramp-detector: {choice.ramp} is the --mainline-detector; allowed is another one"
+        )
+    for stream in STREAMS:
+        detector = getattr(choice, stream)
+        station_m, start_m = choice.stations_m.get(detector), data[stream]["start_m"]
+        if station_m is not None and not start_m < station_m <= 0.0:
+            why = " upstream of the nose" if station_m > 0.0 else ""
+            raise CorampError(
+                f"--detector: {detector}={station_m:g}: is not on the {stream}{why}; "
+                f"allowed is above {start_m:g} to 0 m"
+            )
+    if unknown := [name for name in choice.classes if name not in counts.classes]:
+        raise CorampError(
+            f"--class: {choice.file} has no class {unknown[0]!r}; "
+            f"allowed are {', '.join(counts.classes)}"
+        )
 
 
 def path_from(file: Path, beside: Path) -> str:
@@ -156,7 +188,7 @@ def _type_of(name: str, choice: CountsChoice) -> str:
 
 
 def _detectors(
-    data: Mapping[str, Any], choice: CountsChoice, interval_s: float
+    data: Mapping[str, Any], choice: CountsChoice, counts: Counts
 ) -> list[dict[str, Any]]:
     own = {choice.mainline: STREAMS[0], choice.ramp: STREAMS[1]}
     roads = {**own, **{name: STREAMS[0] for name in choice.stations_m if name not in own}}
@@ -164,12 +196,16 @@ def _detectors(
         {
             "id": name,
             "road": road,
-            "station_m": choice.stations_m.get(name, _near_entry_m(data[road]["start_m"])),
-            "period_s": interval_s,
+            "station_m": choice.stations_m.get(name, _near_entry_m(data[road], counts.at(name))),
+            "period_s": counts.interval_s,
         }
         for name, road in roads.items()
     ]
 
 
-def _near_entry_m(start_m: float) -> float:
-    return round(start_m + min(FROM_ENTRY_M, MOST_OF_ROAD * -start_m), 3)
+def _near_entry_m(road: Mapping[str, Any], counted: pl.DataFrame) -> float:
+    """Where a detector is taken to be; of several lanes, nobody is to change them before it."""
+    start_m = road["start_m"]
+    by_lane = counted["lane"].n_unique() > 1
+    behind_m = BY_LANE_M if by_lane else min(FROM_ENTRY_M, MOST_OF_ROAD * -start_m)
+    return float(round(start_m + behind_m, 3))

@@ -17,12 +17,7 @@ Numbered = tuple[int, DemandPart]
 
 def demand_problems(scenario: "Scenario") -> list[str]:
     """Returns a line for each part of demand, or pair of them, that cannot be."""
-    problems = [
-        f"demand.{k}.{line}"
-        for k, part in enumerate(scenario.demand)
-        for line in _part_problems(scenario, part)
-    ]
-    if problems:
+    if problems := list(dict.fromkeys(_own_problems(scenario))):
         return problems
     for on_ramp, route in enumerate(STREAMS):
         here = [(k, part) for k, part in enumerate(scenario.demand) if part.route == route]
@@ -35,6 +30,13 @@ def demand_problems(scenario: "Scenario") -> list[str]:
             own = [found for found in here if found[1].lane == lane]
             problems += _together(scenario, bool(on_ramp), own)
     return problems
+
+
+def _own_problems(scenario: "Scenario") -> Iterator[str]:
+    """What each part of demand has wrong by itself. Of counts it is told by road, not by part."""
+    for k, part in enumerate(scenario.demand):
+        where = f"demand.{k}." if scenario.counts is None else f"counts.{part.route}: "
+        yield from (where + line for line in _part_problems(scenario, part))
 
 
 def _part_problems(scenario: "Scenario", part: DemandPart) -> Iterator[str]:
@@ -64,6 +66,8 @@ def _station_problems(scenario: "Scenario", route: str, station_m: float | None)
     """Vehicles must have entered there, and those of the ramp not have merged yet."""
     start_m = getattr(scenario, route).start_m
     end_m = scenario.mainline.end_m if route == STREAMS[0] else 0.0
+    if scenario.counts is not None:
+        end_m = 0.0  # behind the nose it counts those of the ramp as well
     if station_m is not None and not start_m <= station_m <= end_m:
         yield (
             f"station_m: {station_m:g} is not on the {route}; allowed is {start_m:g} to {end_m:g} m"
@@ -93,8 +97,12 @@ def _together(scenario: "Scenario", on_ramp: bool, parts: Sequence[Numbered]) ->
         number, until = k, part
         length_s = part.end_s - part.begin_s
         if count * headway_s > length_s:
+            where = f"demand.{k}: "
+            if scenario.counts is not None:
+                where = f"counts.{part.route}: from {part.begin_s:g} to {part.end_s:g} s "
+                where += "" if part.lane is None else f"on lane {part.lane} "
             yield (
-                f"demand.{k}: {count:g} vehicles in {length_s:g} s cannot come with headways of "
+                f"{where}{count:g} vehicles in {length_s:g} s cannot come with headways of "
                 f"{headway_s:.2g} s or more; allowed are up to {int(length_s / headway_s)}"
             )
 

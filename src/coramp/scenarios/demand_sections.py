@@ -1,5 +1,6 @@
 """The tables of a scenario file on demand over time, measured demand and detectors."""
 
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -47,6 +48,17 @@ class DemandPart(Table):
         if self.vehicles is not None:
             return float(self.vehicles)
         return (self.flow_veh_h or 0.0) * (self.end_s - self.begin_s) / 3600.0
+
+
+def peak_veh_h(parts: Iterable[DemandPart], route: str) -> float:
+    """Returns the highest flow (veh/h) of a route in an interval of its demand."""
+    flows: dict[tuple[float, float], float] = {}
+    for part in parts:
+        if part.route == route:
+            interval = part.begin_s, part.end_s
+            hours = (part.end_s - part.begin_s) / 3600.0
+            flows[interval] = flows.get(interval, 0.0) + part.count / hours
+    return max(flows.values(), default=0.0)
 
 
 class CountsFile(Table):

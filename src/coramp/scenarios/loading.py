@@ -65,3 +65,14 @@ def drivers_checked(scenario: Scenario, drivers: str) -> str:
             f"drivers: there is no {drivers!r} in {scenario.name}; allowed are {known}"
         )
     return drivers
+
+
+def check_one_lane(scenario: Scenario, who: str, instead: str) -> None:
+    """Raises CorampError for a road in a network, or of several lanes; ``instead`` drives there."""
+    if scenario.has_one_lane:
+        return
+    where = "mainline.lanes" if scenario.network is None else "network"
+    raise CorampError(
+        f"{where}: {who} for coramp's own road of one mainline lane; allowed is such a scenario, "
+        f"or {instead}"
+    )

@@ -19,6 +19,12 @@ OTHER_KIND = {
     "string_type": "not a text; allowed is one text in quotes",
 }
 """What a value of another kind than a key's is."""
+PATTERNS = {
+    r"^[^\s<>&\"',;]+$": "a name without spaces and without < > & \" ' , ;",
+    r"^[A-Za-z0-9_-]+$": "a name of letters, digits, _ and -",
+    "^[0-9a-f]{64}$": "a hash of 64 hexadecimal digits",
+}
+"""What texts of a pattern are."""
 SHAPES = ("(one)", "(list)")
 """Tags of a value that may be one or a list; they are no part of its key."""
 
@@ -130,6 +136,8 @@ def _lines_of(model: type[BaseModel], problem: Any) -> list[str]:
             return [f"{key}: {shown} is {_out_of_range(key, float(value), context)}"]
         case kind if kind in OTHER_KIND:
             return [f"{key}: {shown} is {OTHER_KIND[kind]}"]
+        case "string_pattern_mismatch" if context["pattern"] in PATTERNS:
+            return [f"{key}: {shown} cannot be; allowed is {PATTERNS[context['pattern']]}"]
         case "literal_error":
             return [f"{key}: {shown} is not known; allowed is {context['expected']}"]
         case "model_type" | "dict_type" | "model_attributes_type":

@@ -7,7 +7,7 @@ from coramp.studies.speed_unit import MPS, SpeedUnit
 
 SPEED = "speed"
 """The unit of what is shown in the unit of speeds that was chosen."""
-POWERS = {"m/s2": "m/s²", "m/s3": "m/s³", "m2/s4": "m²/s⁴"}
+POWERS = {"m/s2": "m/s²", "m/s3": "m/s³", "m2/s4": "m²/s⁴", "g)2": "g)²"}
 RUNG_COLUMNS = {rung: f"rung_{rung}" for rung in RUNGS}
 """The columns that count the ramp vehicles of each rung."""
 

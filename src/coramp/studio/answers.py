@@ -6,6 +6,7 @@ from collections import OrderedDict
 from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from dataclasses import dataclass, field
+from pathlib import Path
 from threading import Lock, Thread
 
 import tomli_w
@@ -16,7 +17,10 @@ from coramp.report.page.assemble import assembled
 from coramp.report.page.pages import answer, comparison_table, notes
 from coramp.report.page.shown import called, title_of
 from coramp.report.style import look_of
+from coramp.road.streams import STREAMS
 from coramp.runs.running import RunSpec, recorded
+from coramp.scenarios.listed import FLOWS
+from coramp.scenarios.measured import COUNTS, DEMAND
 from coramp.studies.tables import Table
 from coramp.studio.dials import AUTOMATION, DECIDING, NOTHING, Studio
 from coramp.studio.process import Played, Simulated, SumoProcesses, played_from
@@ -147,9 +151,22 @@ class Answers:
         spec = self.studio.specs(asked)[0]
         content = spec.scenario.model_dump(mode="json", exclude_none=True, exclude={"arrivals"})
         content["name"] = self.saved_name
+        self._leave_out_what_demand_says(content)
         return (
             f"# Set in coramp studio; run it by\n# {self._command(spec)}\n{tomli_w.dumps(content)}"
         )
+
+    def _leave_out_what_demand_says(self, content: Row) -> None:
+        """Takes out of a scenario what follows from its counts, or from its demand over time."""
+        counts = content.get(COUNTS)
+        if counts:
+            beside = Path(self.studio.source).absolute().parent
+            counts["file"] = str(beside / counts["file"])
+            del content[DEMAND]
+        if counts or content.get(DEMAND):
+            for stream in STREAMS:
+                for key in FLOWS:
+                    content[stream].pop(key, None)
 
     def _joined(self, spec: RunSpec) -> Job:
         """Returns a run's job, for which one more waits; begins it unless it is under way.

@@ -7,10 +7,12 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
-from coramp.runs.mixed import coordinates_drivers
+from coramp.runs.mixed import check_mixed, coordinates_drivers
 from coramp.runs.running import UNCONTROLLED, RunSpec, make_spec
+from coramp.scenarios.corridors import is_corridor
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
+from coramp.strategies.base import Strategy
 from coramp.strategies.registry import strategies
 from coramp.studio.following import following
 from coramp.studio.world import PERFECT, PRESET_WORDS, share_percent, with_share
@@ -69,6 +71,9 @@ DIALS = (
     Dial("horizon", "simulation.horizon_s", "time of arrivals", "s", 30.0, 1800.0, 30.0),
     Dial("seed", "", "seed", "", 0.0, 10_000.0, 1.0),
 )
+OF_NETWORK = ("ramp.acceleration_lane_m", "mainline.speed_mps", "ramp.speed_mps")
+OF_DEMAND = ("mainline.flow_veh_h", "ramp.flow_veh_h")
+"""What is as it is in a network, and where counts or demand over time are given."""
 DECIDING = ("gap", "mainline", "ramp", "lane", "share")
 """The dials that decide most; the page shows these at once and folds the others."""
 CHOICES = ("strategy", "second")
@@ -88,9 +93,13 @@ class Studio:
 
     @property
     def dials(self) -> tuple[Dial, ...]:
-        """The dials, each with a range that holds the value it starts at."""
-        start = self.start
-        return tuple(dial.widened(start[dial.name]) for dial in DIALS)
+        """The dials of what can be set, each with a range that holds the value it starts at.
+
+        Lengths and limits are those of a network; counts and demand over time say how many come.
+        """
+        start, scenario = self.start, self.scenario
+        fixed = {*(OF_NETWORK if scenario.network else ()), *(OF_DEMAND if scenario.demand else ())}
+        return tuple(dial.widened(start[dial.name]) for dial in DIALS if dial.key not in fixed)
 
     @property
     def start(self) -> dict[str, float]:
@@ -105,7 +114,7 @@ class Studio:
 
         Those with a kind of drivers have nobody automated. Automation alone stands between.
         """
-        every = strategies().items()
+        every = [found for found in strategies().items() if _can_drive(self.scenario, found[1])]
         return [
             *(name for name, found in every if found.cooperative),
             AUTOMATION,
@@ -221,19 +230,35 @@ class Studio:
             world |= with_share(self.scenario, values["share"])
         changed = {
             dial.key: values[dial.name]
-            for dial in DIALS
+            for dial in self.dials
             if dial.key and values[dial.name] != dial.value_of(self.scenario)
         }
         return {**changed, **dict(following(self.scenario, changed)), **world}
 
 
 def _is_mixed(scenario: Scenario) -> bool:
-    """Whether only SUMO has this world: with drivers, or where something goes wrong."""
-    return scenario.is_mixed or scenario.has_faults
+    """Whether only SUMO has this world: drivers, several lanes, or where something goes wrong."""
+    return scenario.is_mixed or scenario.has_faults or not scenario.has_one_lane
+
+
+def _can_drive(scenario: Scenario, strategy: type[Strategy]) -> bool:
+    """Whether a strategy knows the road of a scenario: several lanes or a network, not all do."""
+    if scenario.has_one_lane:
+        return True
+    try:
+        check_mixed(scenario, strategy, "sumo", scenario.traffic.drivers)
+    except CorampError:
+        return False
+    return True
 
 
 def studio_of(source: str) -> Studio:
     """Returns the studio of a scenario, by name or file; raises CorampError if it is not valid."""
+    if is_corridor(source):
+        raise CorampError(
+            f"{source}: has several merge sites, which the studio does not show; "
+            "allowed is a scenario of one"
+        )
     scenario = load_scenario(source)
     if scenario.arrivals:
         raise CorampError(

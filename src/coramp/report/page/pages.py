@@ -7,14 +7,13 @@ from coramp.agency.before_after import Measured, Pairs
 from coramp.errors import CorampError
 from coramp.records.run import RunRecords
 from coramp.records.schemas import MIXED_METRICS, Row
-from coramp.records.world_told import told_of_world
+from coramp.report.page.asked import asked_table
 from coramp.report.page.assemble import assembled, packed
 from coramp.report.page.over_time import over_time_pictures
 from coramp.report.page.shown import title_of
 from coramp.report.page.summary import summary_of, summary_of_pairs
 from coramp.road.streams import STREAMS
 from coramp.runs.running import broken_promises
-from coramp.scenarios.world_sections import TABLES
 from coramp.studies.metric_labels import LABELS, RUNG_COLUMNS, in_unit, label_of, typeset
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number
@@ -129,62 +128,6 @@ def _frame(kind: str, runs: Sequence[RunRecords]) -> Row:
 
 def _texts(pair: tuple[str, object]) -> tuple[str, str]:
     return pair[0], str(pair[1])
-
-
-def asked_table(run: RunRecords, unit: SpeedUnit = MPS) -> Table:
-    """Returns the road, traffic and error budget that were asked about; speeds in a unit."""
-    scenario = run.scenario
-    mainline, ramp, safety = scenario.mainline, scenario.ramp, scenario.safety
-    speeds_text = [f"{unit.of(s.speed_mps):g} {unit.name}" for s in (mainline, ramp)]
-    rows = (
-        ("scenario", f"{scenario.name}: {scenario.description}".rstrip(": ")),
-        ("mainline", f"{mainline.start_m:g} to {mainline.end_m:g} m, {speeds_text[0]}"),
-        ("ramp", f"{-ramp.start_m:g} m, {speeds_text[1]}, at {ramp.merge_angle_deg:g}°"),
-        ("acceleration lane", f"{ramp.acceleration_lane_m:g} m"),
-        ("flow, mainline + ramp", run.flows),
-        ("arrivals", _arrivals(run)),
-        ("positioning error, clock error", _errors(safety.positioning_error_m, run)),
-        *_kinds(run),
-        *_world(run),
-        ("computed in", "SUMO" if run.summary["engine"] == "sumo" else "the exact engine"),
-    )
-    return Table("Road, traffic and errors of this run", ("what", "value"), rows)
-
-
-def _kinds(run: RunRecords) -> tuple[tuple[str, str], ...]:
-    """Who drives, where drivers and automated vehicles mix."""
-    if not run.is_mixed:
-        return ()
-    automated = run.vehicles["automated"].sum()
-    others = run.vehicles.height - automated
-    return (("vehicles", f"{automated} automated, {others} with {run.summary['drivers']} drivers"),)
-
-
-def _world(run: RunRecords) -> tuple[tuple[str, str], ...]:
-    """What of the world was not perfect, and what came of it."""
-    scenario, preset = run.scenario, run.scenario.world.preset
-    tables = ", ".join(f"[{t}]" for t in TABLES if not getattr(scenario, t).is_perfect)
-    if not tables:
-        return ()
-    asked = f"{preset}: {tables}" if preset else tables
-    happened = told_of_world(run)
-    return (("world", f"{asked}; {happened}" if happened else asked),)
-
-
-def _arrivals(run: RunRecords) -> str:
-    listed = [arrival.stream for arrival in run.scenario.arrivals]
-    over = f"{run.scenario.simulation.horizon_s:g} s, seed {run.summary['seed']}"
-    if not listed:
-        return over
-    return f"listed, {listed.count('mainline')} + {listed.count('ramp')} vehicles in {over}"
-
-
-def _errors(positioning_error_m: float, run: RunRecords) -> str:
-    safety = run.scenario.safety
-    gap = f"; time gap {safety.time_gap_s:g} s" if safety.time_gap_s else ""
-    if safety.standstill_gap_m:
-        gap += f"; standstill gap {safety.standstill_gap_m:g} m"
-    return f"{positioning_error_m:g} m, {safety.clock_error_s:g} s{gap}"
 
 
 def answer(run: RunRecords) -> str:

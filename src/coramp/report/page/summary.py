@@ -9,6 +9,8 @@ from coramp.records.schemas import Row
 from coramp.report.contour_figure import contour_figure, queue_figure
 from coramp.report.page.shown import title_of
 from coramp.report.page.svg import picture
+from coramp.road.streams import STREAMS
+from coramp.scenarios.demand_sections import peak_veh_h
 from coramp.studies.speed_unit import MPS, SpeedUnit
 from coramp.studies.tables import Table, number, with_interval
 
@@ -95,9 +97,12 @@ def _asked(measured: Measured, seeds: int) -> str:
     if run.scenario.arrivals:
         return f"Traffic is a list of {run.vehicles.height} vehicles {over}."
     draws = f"{seeds} draws of arrivals" if seeds > 1 else "one draw of arrivals"
+    demand = run.scenario.demand
+    peaks = [f"{peak_veh_h(demand, stream):g}" for stream in STREAMS]
+    peak = f", {' and '.join(peaks)} where most come" if demand else ""
     return (
         f"Traffic is {run.content['mainline_veh_h']:g} vehicles an hour on the mainline and "
-        f"{run.content['ramp_veh_h']:g} on the ramp {over}, simulated with {draws}."
+        f"{run.content['ramp_veh_h']:g} on the ramp {over}{peak}, simulated with {draws}."
     )
 
 
