@@ -10,6 +10,8 @@ import pytest
 import coramp
 from coramp import CorampError
 from coramp.records.corridor_outcome import CORRIDOR_RUNS, CORRIDOR_SITES, SITES, TOTALS
+from coramp.report.study_folder import read_study
+from coramp.report.writing import report
 from coramp.studies import runner
 from coramp.studies.corridor_paired import WHOLE, delays_of, gains
 from tests.corridors import SITES as BOTH
@@ -182,6 +184,24 @@ def _with_another_name(folder, tmp_path):
     content = json.loads((tmp_path / "o" / "study.json").read_text())
     (tmp_path / "o" / "study.json").write_text(json.dumps({**content, "kind": "study"}))
     return tmp_path / "o"
+
+
+def test_its_page_answers_and_the_figures_of_one_site_refuse_it(resumed):
+    _, _, result = resumed
+    page = report(result.folder).read_text()
+    delay_s = result.tables[0].rows[0][2]
+    assert f"a vehicle loses {delay_s} s on average" in page
+    assert "than uncontrolled; this " in page
+    assert page.count("data:image/svg+xml") == 1
+    assert "coramp study study.toml --seeds 2" in page
+    assert all(site in page for site in BOTH)
+    assert result.plot_delay().get_axes()[0].get_title() == "mainline"
+    assert "<table" in result._repr_html_()
+    assert set(result.to_pandas()) == {"runs", "sites"}
+    with pytest.raises(CorampError, match="holds the study of a corridor, of which there is no"):
+        read_study(result.folder)
+    with pytest.raises(CorampError, match=r"^over: flow: a corridor's study is drawn by site"):
+        result.plot_delay("flow")
 
 
 def test_what_is_ahead_is_told(resumed, tmp_path):
