@@ -14,6 +14,7 @@ from coramp.errors import CorampError
 if TYPE_CHECKING:
     from coramp.api import (
         CorridorResult,
+        CorridorStudyResult,
         PlanResult,
         RunResult,
         StudyResult,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CorampError",
     "CorridorResult",
+    "CorridorStudyResult",
     "PlanResult",
     "RunResult",
     "StudyResult",

@@ -9,7 +9,11 @@ import pytest
 
 import coramp
 from coramp import CorampError
+from coramp.demand.corridor_demand import traffic_of
 from coramp.records.corridor_outcome import CORRIDOR_RUNS, CORRIDOR_SITES, SITES, TOTALS
+from coramp.report.study_folder import read_study
+from coramp.report.writing import report
+from coramp.scenarios.corridors import load_corridor
 from coramp.studies import runner
 from coramp.studies.corridor_paired import WHOLE, delays_of, gains
 from tests.corridors import SITES as BOTH
@@ -134,13 +138,23 @@ def test_gains_are_differences_on_the_same_arrivals(resumed):
     assert {row[-1] for row in gained.rows} == {"2"}
 
 
-def test_the_arrivals_of_a_seed_are_the_same_for_every_strategy_and_share(tmp_path, network):
+def test_the_arrivals_of_a_seed_are_the_same_for_every_share(tmp_path, network):
+    path = written(tmp_path, network, 0.5)
     known = []
-    for strategy, share in (("uncontrolled", 0.0), ("mixed-slots", 0.5), ("mixed-slots", 1.0)):
-        path = written(tmp_path, network, share, 20.0)
-        trips = coramp.corridor(path, strategy).frames["trips"]
-        known.append(trips.select("vehicle_id", "origin", "scheduled_s", "leaves_by"))
-    assert all(one.equals(other) for one, other in pairwise(known))
+    for share in (0.0, 0.5, 1.0):
+        corridor = load_corridor(path, {"traffic.automated_share": share})
+        traffic = traffic_of(corridor, 7)
+        known.append(
+            [
+                (arrival.vehicle_id, arrival.step, way)
+                for own in traffic
+                for arrival, way in zip(own.arrivals, own.leaves_by, strict=True)
+            ]
+        )
+        automated = sum(int(own.automated.sum()) for own in traffic)
+        assert automated == pytest.approx(share * len(known[-1]), abs=0.15 * len(known[-1]))
+    assert len(known[0]) > 50
+    assert all(one == other for one, other in pairwise(known))
 
 
 def test_a_run_that_fails_is_a_row_and_runs_again(resumed, tmp_path, monkeypatch):
@@ -182,6 +196,24 @@ def _with_another_name(folder, tmp_path):
     content = json.loads((tmp_path / "o" / "study.json").read_text())
     (tmp_path / "o" / "study.json").write_text(json.dumps({**content, "kind": "study"}))
     return tmp_path / "o"
+
+
+def test_its_page_answers_and_the_figures_of_one_site_refuse_it(resumed):
+    _, _, result = resumed
+    page = report(result.folder).read_text()
+    delay_s = result.tables[0].rows[0][2]
+    assert f"a vehicle loses {delay_s} s on average" in page
+    assert "than uncontrolled; this " in page
+    assert page.count("data:image/svg+xml") == 1
+    assert "coramp study study.toml --seeds 2" in page
+    assert all(site in page for site in BOTH)
+    assert result.plot_delay().get_axes()[0].get_title() == "mainline"
+    assert "<table" in result._repr_html_()
+    assert set(result.to_pandas()) == {"runs", "sites"}
+    with pytest.raises(CorampError, match="holds the study of a corridor, of which there is no"):
+        read_study(result.folder)
+    with pytest.raises(CorampError, match=r"^over: flow: a corridor's study is drawn by site"):
+        result.plot_delay("flow")
 
 
 def test_what_is_ahead_is_told(resumed, tmp_path):

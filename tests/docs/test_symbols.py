@@ -17,7 +17,7 @@ from coramp.messages import kinds
 from coramp.networks.net_file import read_network
 from coramp.networks.ramps import on_ramps
 from coramp.records import schemas
-from coramp.records.corridor_outcome import CORRIDOR_FILES, TOTALS
+from coramp.records.corridor_outcome import CORRIDOR_FILES, CORRIDOR_RUNS, CORRIDOR_SITES, TOTALS
 from coramp.runs.corridors import CONTENT
 from coramp.runs.running import make_spec, run_content
 from coramp.scenarios.corridor_section import CorridorSection
@@ -71,6 +71,8 @@ FILES = {
     "coramp compare --json": FIGURES,
     "detectors.csv": counts.SCHEMA,
     **{f"{name}.parquet": schema for name, schema in CORRIDOR_FILES.items()},
+    "runs.parquet of a corridor's study": CORRIDOR_RUNS,
+    "sites.parquet of a corridor's study": CORRIDOR_SITES,
 }
 RAMPS = "coramp ramps --json"
 MODELS = {

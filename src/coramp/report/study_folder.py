@@ -39,6 +39,11 @@ def read_study(folder: Path) -> StoredStudy:
             f"{folder}: holds no study; give a folder that coramp study --out has written"
         )
     content = read_json(folder / MARK)
+    if is_corridor_study(folder):
+        raise CorampError(
+            f"{folder}: holds the study of a corridor, of which there is no such figure; allowed "
+            "are coramp report, which draws it, and studies of one merge site"
+        )
     path = folder / "runs.parquet"
     if not path.exists():
         raise CorampError(f"{folder}: is not finished; start its coramp study again")

@@ -17,8 +17,8 @@ SECONDS_PER_VEHICLE = {
     ("exact", False): 5e-5,
     ("sumo", False): 8e-4,
     ("sumo", True): 2e-3,
-    ("corridor", False): 4e-3,
-    ("corridor", True): 2e-2,
+    ("corridor", False): 8e-3,
+    ("corridor", True): 1.5e-2,
 }
 """By engine, and whether drivers drive, or on a corridor whether vehicles are coordinated: of runs
 on the machine of docs/performance.md."""

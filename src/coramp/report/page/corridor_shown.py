@@ -53,14 +53,24 @@ def corridor_data(records: CorridorRecords) -> Row:
 def _seen(records: CorridorRecords) -> tuple[pl.DataFrame, float, float]:
     """Positions at the shortest period of which a page has room; and until when (s)."""
     every = [max(1, round(period_s / records.step_s)) for period_s in PERIODS_S]
-    rows = records.positions().select(pl.len()).collect().item()
-    chosen = next((k for k in every if rows / k <= MOST_SAMPLES), every[-1])
-    seen = records.positions(chosen).with_columns(at=pl.col("step") // chosen).collect()
+    counts = records.positions().group_by("step").len().sort("step").collect()
+    chosen = next((k for k in every if _at(counts, k)["len"].sum() <= MOST_SAMPLES), every[-1])
+    shown = _at(counts, chosen).filter(pl.col("len").cum_sum() <= MOST_SAMPLES)
     period_s, until_s = chosen * records.step_s, float(records.summary["until_s"])
-    if seen.height > MOST_SAMPLES:
-        last = int(seen["at"].sort()[MOST_SAMPLES])
-        return seen.filter(pl.col("at") <= last), period_s, last * period_s
-    return seen, period_s, until_s
+    last = int(shown["step"].max() or 0)  # type: ignore[arg-type]
+    seen = (
+        records.positions(chosen)
+        .filter(pl.col("step") <= last)
+        .with_columns(at=pl.col("step") // chosen)
+        .collect()
+    )
+    whole = shown.height == _at(counts, chosen).height
+    return seen, period_s, until_s if whole else last * records.step_s
+
+
+def _at(counts: pl.DataFrame, every: int) -> pl.DataFrame:
+    """How many vehicles there are at each so many steps."""
+    return counts.filter(pl.col("step") % every == 0)
 
 
 def _lanes(network: Network, corridor: Corridor, used: list[str]) -> Iterator[Lane]:
