@@ -355,3 +355,59 @@ def test_counts_by_lane_are_seen_again_on_their_lanes(here):
     assert both.height == 12
     assert (both["vehicles"] - both["vehicles_right"]).abs().max() <= 1
     assert both["vehicles"].sum() == both["vehicles_right"].sum() == 272
+
+
+def test_a_detector_of_its_own_on_each_lane(here):
+    (here / "road.toml").write_text(ROAD)
+    lines = [
+        f"{300 * k},{d},{n + k}" for k in range(2) for d, n in (("A", 50), ("B", 70), ("R", 9))
+    ]
+    (here / "c.csv").write_text("\n".join(["begin_s,detector,vehicles", *lines]))
+    given = (
+        "new-scenario",
+        "s",
+        "--road",
+        "road.toml",
+        "--counts",
+        "c.csv",
+        "--ramp-detector",
+        "R",
+    )
+    assert invoke(*given, "--mainline-detector", "A+B", "--detector", "A+B=-200").code == 0
+    scenario = load_scenario("s.toml")
+    found = [(p.lane, p.begin_s, p.vehicles) for p in scenario.demand if p.route == "mainline"]
+    assert found == [(0, 0.0, 50), (1, 0.0, 70), (0, 300.0, 51), (1, 300.0, 71)]
+    assert {p.station_m for p in scenario.demand if p.route == "mainline"} == {-200.0}
+    assert scenario.detector[0].id == "A+B"
+    told = invoke("new-scenario", "t", *given[2:], "--mainline-detector", "A+X")
+    assert told.errors == [
+        "Error: --mainline-detector: c.csv has no detector 'A+X'; allowed are A, B, R"
+    ]
+
+
+def test_lanes_that_were_not_counted(here):
+    (here / "road.toml").write_text(ROAD)
+    lines = [f"{300 * k},{d},0,9" for k in range(2) for d in "MR"]
+    (here / "c.csv").write_text("\n".join(["begin_s,detector,lane,vehicles", *lines]))
+    assert new("--road", "road.toml").errors == [
+        (
+            "Error: s.toml: counts.mainline: c.csv has lane 0 at M, and the mainline has 2 lanes; "
+            "allowed are counts of each lane, or of all together"
+        )
+    ]
+
+
+def test_detectors_beside_each_other_are_upstream_together(here):
+    lines = [f"{300 * k},{d},{n}" for k in range(2) for d, n in (("A", 50), ("B", 70), ("D", 60))]
+    (here / "c.csv").write_text("\n".join(["begin_s,detector,vehicles", *lines]))
+    told = invoke("counts", "c.csv", "--upstream", "A+B", "--downstream", "D")
+    assert told.errors == [
+        (
+            "Error: c.csv: row 4: up to 300 s D has 60 vehicles less than A and B upstream of it; "
+            "allowed are up to 50 on the way"
+        ),
+        (
+            "Error: c.csv: row 7: up to 600 s D has 60 vehicles less than A and B upstream of it; "
+            "allowed are up to 50 on the way"
+        ),
+    ]

@@ -93,7 +93,12 @@ def new_scenario(
         typer.Option(metavar="FILE", help="Demand as counted; coramp counts shows such a file."),
     ] = None,
     mainline_detector: Annotated[
-        str | None, typer.Option(metavar="ID", help="The detector of the mainline in --counts.")
+        str | None,
+        typer.Option(
+            metavar="ID",
+            help="The detector of the mainline in --counts; several are one a lane, as in M0+M1, "
+            "from the lane next to the ramp on.",
+        ),
     ] = None,
     ramp_detector: Annotated[
         str | None, typer.Option(metavar="ID", help="The detector of the ramp in --counts.")

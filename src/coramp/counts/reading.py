@@ -19,6 +19,7 @@ from coramp.counts.table import (
     Problem,
     Repair,
     counts_of,
+    in_row,
     told_briefly,
 )
 from coramp.counts.tabular import Read, lines_of_table
@@ -77,6 +78,8 @@ def examined(
         raise CorampError(f"{path}: has no rows; allowed is a count in each row after the first")
     lines = that_add_up(lines, findings, lanes)
     if downstream is not None:
+        known = {line.detector for line in lines}
+        upstream = [one for name in upstream for one in in_row(name, known)]
         _check_known([*upstream, downstream], lines, path)
         if not findings.problems:
             lines = check_balance(lines, upstream, downstream, findings, ROOM)

@@ -1,5 +1,6 @@
 """A table of counts, the lines that a file gives for it, and what is said of them."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import NamedTuple
@@ -17,6 +18,8 @@ SCHEMA: dict[str, pl.DataType | type[pl.DataType]] = {
 }
 """The columns of counts; ``lane``, 0 being the rightmost, and ``mean_speed_mps`` may be null."""
 CAR, TRUCK = "car", "truck"
+BESIDE = "+"
+"""It stands between the names of detectors that lie beside each other, one a lane."""
 NAMED_AT_MOST = 10
 """So many lines are told of a file, and then how many more there are."""
 SHORTEST_S, LONGEST_S = 60.0, 3600.0
@@ -144,9 +147,27 @@ class Counts:
         """How long an interval is, but the last one."""
         return float((self.frame["end_s"] - self.frame["begin_s"]).max())  # type: ignore[arg-type]
 
+    def has(self, detector: str) -> bool:
+        """Returns whether there is a detector, or each of a row of them."""
+        known = self.detectors
+        return all(name in known for name in in_row(detector, known))
+
     def at(self, detector: str) -> pl.DataFrame:
-        """Returns the rows of a detector."""
-        return self.frame.filter(pl.col("detector") == detector)
+        """Returns the rows of a detector; of several in a row, each with the lane of its place."""
+        names = in_row(detector, self.detectors)
+        if len(names) == 1:
+            return self.frame.filter(pl.col("detector") == detector)
+        return pl.concat(
+            self.frame.filter(pl.col("detector") == name).with_columns(
+                detector=pl.lit(detector), lane=pl.lit(lane, pl.Int64)
+            )
+            for lane, name in enumerate(names)
+        ).sort("begin_s", "lane", "vehicle_class")
+
+
+def in_row(detector: str, known: Collection[str]) -> list[str]:
+    """Returns the detectors that a name stands for: ``A+B`` for A on lane 0 and B on lane 1."""
+    return [detector] if detector in known else detector.split(BESIDE)
 
 
 def counts_of(

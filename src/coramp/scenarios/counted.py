@@ -97,7 +97,7 @@ def with_counts_tables(
     counts = read_counts(choice.file, choice.repair, lanes)
     for stream in STREAMS:
         option, detector = f"--{stream}-detector", getattr(choice, stream)
-        if detector not in counts.detectors:
+        if not counts.has(detector):
             known = ", ".join(counts.detectors)
             raise CorampError(
                 f"{option}: {choice.file} has no detector {detector!r}; allowed are {known}"

@@ -59,7 +59,7 @@ def with_counts(data: Mapping[str, Any], label: str, origins: Mapping[str, str])
             f"allowed is {source.sha256}, or a new scenario by coramp new-scenario"
         )
     counts = _read(path, digest, source, _lanes_of(data))
-    parts = demand_of(counts, source, _types_of(data), _stations(data), blamed)
+    parts = demand_of(counts, source, _types_of(data), _stations(data), _lanes_of(data), blamed)
     return {**data, COUNTS: {**data[COUNTS], "sha256": digest}, DEMAND: parts}
 
 
@@ -103,23 +103,27 @@ def demand_of(
     source: CountsFile,
     types: list[str],
     stations_m: Mapping[str, float],
+    lanes: int,
     blamed: str,
 ) -> list[dict[str, Any]]:
     """Returns the parts of demand that counts amount to, as tables of a scenario file.
 
-    ``types`` are the names of the scenario's types, ``stations_m`` the detectors' places. Raises
-    CorampError for detectors that are not there, and classes that no type is known for.
+    ``types`` are the names of the scenario's types, ``stations_m`` the detectors' places, ``lanes``
+    those of the mainline. Raises CorampError for detectors that are not there, for lanes that are
+    missing, and for classes that no type is known for.
     """
     first_s, last_s = _window(counts, source, blamed)
     parts: list[dict[str, Any]] = []
     for route in STREAMS:
         detector = getattr(source, route)
-        if detector not in counts.detectors:
+        if not counts.has(detector):
             known = ", ".join(counts.detectors)
             raise CorampError(
                 f"{blamed}: counts.{route}: {source.file} has no detector {detector!r}; "
                 f"allowed are {known}"
             )
+        if route == STREAMS[0]:
+            _check_lanes(counts.at(detector), source, lanes, blamed)
         rows = counts.at(detector).filter(
             pl.col("begin_s") >= first_s, pl.col("begin_s") < last_s, pl.col("vehicles") > 0
         )
@@ -140,6 +144,18 @@ def demand_of(
             "allowed is one at least"
         )
     return parts
+
+
+def _check_lanes(rows: pl.DataFrame, source: CountsFile, lanes: int, blamed: str) -> None:
+    """Raises CorampError where some lanes of the mainline were counted and others were not."""
+    seen = sorted(rows["lane"].drop_nulls().unique().to_list())
+    if not seen or len(seen) >= lanes:
+        return
+    raise CorampError(
+        f"{blamed}: counts.mainline: {source.file} has lane {', '.join(map(str, seen))} at "
+        f"{source.mainline}, and the mainline has {lanes} lanes; allowed are counts of each lane, "
+        "or of all together"
+    )
 
 
 def _window(counts: Counts, source: CountsFile, blamed: str) -> tuple[float, float]:
