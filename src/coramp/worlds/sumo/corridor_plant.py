@@ -12,11 +12,7 @@ from coramp.mixed.users import RoadUsers
 from coramp.worlds.sumo.corridor_record import CorridorRecord
 from coramp.worlds.sumo.corridor_road import CorridorRoad, SiteRoad
 from coramp.worlds.sumo.corridor_sites import SiteAnswer, SiteView
-from coramp.worlds.sumo.mixed_lanes import LanedPlant
-
-NO_SITE = -1
-REFUSED_S = 1.0
-"""So long SUMO may refuse a merge of a vehicle that stands, and that the law on board allows."""
+from coramp.worlds.sumo.mixed_lanes import NO_SITE, LanedPlant
 
 
 class Found(NamedTuple):
@@ -64,8 +60,6 @@ class CorridorPlant(LanedPlant):
     record: CorridorRecord = field(default_factory=lambda: CorridorRecord(0, 1.0))
     commands: bool = True
     _held: dict[int, tuple[str, int]] = field(default_factory=dict)
-    _from_ramp: set[int] = field(default_factory=set)
-    _refused: dict[int, int] = field(default_factory=dict)
     _seen: set[int] = field(default_factory=set)
 
     @property
@@ -165,8 +159,7 @@ class CorridorPlant(LanedPlant):
             if i is not None and site[i] == k:
                 continue
             del self._held[n]
-            self._changing.discard(n)
-            self._from_ramp.discard(n)
+            self._forget_change(n)
             self._motion.sent_mps[n] = self._motion.sent_m[n] = np.nan
             if i is None:
                 self.session.release(name)  # beyond what is seen, or out of the network
@@ -182,8 +175,6 @@ class CorridorPlant(LanedPlant):
                 if self.able.automated[n] and n not in self._held:
                     self._held[n] = (found.names[i], k)
                     self.actuators.begin(n)
-                    if own.lane[j] == RAMP_LANE:
-                        self._from_ramp.add(n)
                     place = float(own.station_m[j]), float(own.lane[j])
                     self.record.hand_over(now_s, n, k, True, (*place, float(speed_mps[i])))
 
@@ -212,7 +203,8 @@ class CorridorPlant(LanedPlant):
             able.braking_mps2[number],
         )
         may_leave = own.beside & (own.lane == RAMP_LANE) & own.inside
-        view = SiteView(now_s, users, own.lane, own.beside, may_leave, self.ahead(users))
+        tail = self._tails(users, own.lane, k)
+        view = SiteView(now_s, users, own.lane, own.beside, may_leave, self.ahead(users), tail)
         return ZoneUsers([found.names[i] for i in own.place.tolist()], view, own.inside)
 
     def _limits_at(self, site: SiteRoad, own: Placed) -> FloatArray:
@@ -224,36 +216,6 @@ class CorridorPlant(LanedPlant):
             ],
             np.float64,
         )
-
-    def _settle(self, names: Sequence[str], users: RoadUsers) -> None:
-        """Has SUMO judge gaps as usual for who has come from the ramp onto the mainline.
-
-        Where the mainline is empty far and wide SUMO changes lanes by itself, without a command.
-        On the ramp SUMO finds no gap for a vehicle, and nobody could change in before it.
-        """
-        if not self._from_ramp:
-            return
-        for i in np.flatnonzero(users.on_mainline & users.automated).tolist():
-            if int(users.number[i]) in self._from_ramp:
-                self._from_ramp.discard(int(users.number[i]))
-                self._refused.pop(int(users.number[i]), None)
-                self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
-                self.session.take_over(names[i])
-
-    def _change_lane(self, name: str) -> None:
-        """Has a vehicle change to the next lane further in, as SUMO allows.
-
-        SUMO refuses gaps below the standstill gap of who is behind. Where both stand on less, which
-        the law on board allows, neither would ever go on: then it changes without SUMO's check.
-        """
-        number = self.able.number[name]
-        if number in self._from_ramp and self._motion.sent_mps[number] == 0.0:
-            tried = self._refused[number] = self._refused.get(number, 0) + 1
-            if tried * self.period_s > REFUSED_S:
-                lane = self._sumo_lane[name] + 1
-                self.session.change_lane_now(name, lane, self.period_steps)
-                return
-        super()._change_lane(name)
 
     def obey(self, zones: Sequence[ZoneUsers], answers: Sequence[SiteAnswer]) -> None:
         """Has the automated vehicles of all zones do what their coordinators answer."""
@@ -271,7 +233,6 @@ class CorridorPlant(LanedPlant):
             [answer.accel_mps2[zone.inside] for zone, answer in zip(zones, answers, strict=True)]
         )
         lane = np.concatenate([zone.view.lane[zone.inside] for zone in zones])
-        self._settle(names, users)
         self.record.change(users.number[changes & (lane >= OUTERMOST)].tolist())
         self.command(names, users, accel_mps2, changes)
 
