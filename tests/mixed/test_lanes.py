@@ -102,6 +102,19 @@ def test_who_changed_lanes_at_the_nose_is_followed_while_its_rear_is_on_the_ramp
         assert accel_mps2([True, False]) > 0.0
 
 
+def test_a_driver_behind_further_in_is_left_what_he_comes_nearer_until_the_change_is_over():
+    """At 15.5 m/s he keeps 2.5 m + 15.5 m, less 1.5 m; one at 6 m/s has 5.8 m/s a period later.
+
+    (15.5^2 - 5.8^2) / 9 = 22.96 m, and 9.7 m/s times 0.2 s: 41.40 m.
+    """
+
+    def rows(gap_m):
+        return [(0, 0.0, 6.0, True), (1, -5.0 - gap_m, 15.5, False)]
+
+    assert chosen_among(rows(41.38)) == []
+    assert chosen_among(rows(41.42)) == [0]
+
+
 def stops_within_m(speed_mps):
     return speed_mps**2 / (2.0 * B_MPS2)
 

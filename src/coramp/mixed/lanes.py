@@ -128,7 +128,7 @@ def making_way(
             continue
         slowest_mps = min(users.speed_mps[own], ahead.speed_mps[own])
         slowest_mps = max(0.0, slowest_mps + min(0.0, both_mps2[own]) * endless.period_s)
-        if may_be_between(users, own, around, ahead, slowest_mps, endless):
+        if may_be_between(users, own, around, ahead, slowest_mps, endless.period_s, endless):
             found[places] = own
             places += 1
             taken[gap] = True
