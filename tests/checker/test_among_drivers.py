@@ -243,11 +243,16 @@ def test_towards_the_lanes_end_he_is_left_less():
     assert len(merging(41.65, limits=relaxed).unkept) == 1
 
 
-def test_a_driver_who_comes_in_behind_it_in_the_same_step_judges_for_himself():
-    """He follows it on the ramp at 10 m, where he keeps 22.5 m on the mainline."""
-    own = Way(FRONT_M, 20.0, AUTOMATED, STEADY, in_lane_from=1)
-    assert found(own, behind(10.0, 20.0, DRIVER, accel_mps2=STEADY, in_lane_from=1)).unkept == ()
-    assert len(found(own, behind(10.0, 20.0, DRIVER, accel_mps2=STEADY)).unkept) == 1
+@pytest.mark.parametrize(("comes_in", "told"), [(5, 0), (4, 0), (3, 0), (2, 1), (None, 1)])
+def test_a_driver_who_comes_in_behind_it_in_the_same_moment_judges_for_himself(comes_in, told):
+    """He follows it on the ramp at 10 m, where he keeps 22.5 m on the mainline.
+
+    A moment is two steps, in which it cannot learn of him any more.
+    """
+    own = Way(FRONT_M, 20.0, AUTOMATED, STEADY, in_lane_from=5)
+    when = {} if comes_in is None else {"in_lane_from": comes_in}
+    findings = found(own, behind(10.0, 20.0, DRIVER, accel_mps2=STEADY, **when))
+    assert len(findings.unkept) == told
 
 
 @pytest.mark.parametrize(("own", "rear"), [(DRIVER, DRIVER), (DRIVER, AUTOMATED)])

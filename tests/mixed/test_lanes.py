@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from coramp.mixed.lanes import (
     GAIN_MPS2,
     HELD_MPS2,
+    Lanes,
+    decided_in_lanes,
     making_way,
     neighbours_in_lanes,
     on_endless_lanes,
@@ -31,10 +33,16 @@ def users_in(rows):
     return users_of([(at_m, v, lane >= 0, cav) for lane, at_m, v, cav in rows]), lane
 
 
+def in_lanes(lane, tail=None):
+    """Lanes of which nobody can change to the next, with nobody's rear on the ramp by default."""
+    none = np.zeros(len(lane), np.bool_)
+    return Lanes(lane, none, none if tail is None else np.array(tail, np.bool_))
+
+
 def chosen_among(rows, told_mps2=-1.0, laws=ON_BOARD):
     """Which of the automated vehicles of lane 0 make way, all of them told to slow down."""
     users, lane = users_in(rows)
-    around, ahead = neighbours_in_lanes(users, lane), at_once(users)
+    around, ahead = neighbours_in_lanes(users, in_lanes(lane)), at_once(users)
     held = users.automated & (lane == 0)
     told = np.where(held, told_mps2, np.inf)
     return making_way(users, around, ahead, held, told, on_endless_lanes(laws)).tolist()
@@ -45,7 +53,7 @@ def chosen_among(rows, told_mps2=-1.0, laws=ON_BOARD):
 def test_each_lane_has_its_order_and_each_vehicle_its_neighbours_further_in(rows):
     rows = list({row[1]: row for row in rows}.values())
     users, lane = users_in(rows)
-    around = neighbours_in_lanes(users, lane)
+    around = neighbours_in_lanes(users, in_lanes(lane))
     for own, (number, at_m, *_) in enumerate(rows):
         of = {
             n: sorted((x, k) for k, (m, x, *_) in enumerate(rows) if m == n and k != own)
@@ -64,11 +72,47 @@ def test_each_lane_has_its_order_and_each_vehicle_its_neighbours_further_in(rows
 def test_on_one_lane_neighbours_are_those_of_the_one_lane_law(rows):
     rows = list({row[1]: row for row in rows}.values())
     users, lane = users_in(rows)
-    found, known = neighbours_in_lanes(users, lane), neighbours_of(users)
+    found, known = neighbours_in_lanes(users, in_lanes(lane)), neighbours_of(users)
     ramp = lane < 0
     assert found.leader.tolist() == known.leader.tolist()
     assert found.front[ramp].tolist() == known.front[ramp].tolist()
     assert found.rear[ramp].tolist() == known.rear[ramp].tolist()
+
+
+@pytest.mark.parametrize("rear_m", [-7.0, -9.0, -60.0])
+def test_who_changed_lanes_at_the_nose_is_followed_while_its_rear_is_on_the_ramp(rear_m):
+    """One stands 2 m behind the nose in lane 0, its rear 3 m before it; one comes along the ramp.
+
+    Nobody stands in its way on the ramp's lane itself.
+    """
+    users, lane = users_in([(0, 2.0, 0.0, False), (-1, rear_m, 2.0, True)])
+    free, wishes = np.full(2, np.inf), np.zeros(2, np.bool_)
+
+    def accel_mps2(tail):
+        laws = ON_BOARD, on_endless_lanes(ON_BOARD)
+        lanes = in_lanes(lane, tail)
+        return decided_in_lanes(users, lanes, at_once(users), free, wishes, *laws)[1][1]
+
+    assert neighbours_in_lanes(users, in_lanes(lane, [True, False])).leader.tolist() == [-1, 0]
+    assert accel_mps2([False, False]) > 0.0
+    stands_before_m = -3.0 - rear_m
+    if stands_before_m < 10.0:
+        assert accel_mps2([True, False]) < -0.5 * 2.0**2 / (2.0 * stands_before_m)
+    else:
+        assert accel_mps2([True, False]) > 0.0
+
+
+def test_a_driver_behind_further_in_is_left_what_he_comes_nearer_until_the_change_is_over():
+    """At 15.5 m/s he keeps 2.5 m + 15.5 m, less 1.5 m; one at 6 m/s has 5.8 m/s a period later.
+
+    (15.5^2 - 5.8^2) / 9 = 22.96 m, and 9.7 m/s times 0.2 s: 41.40 m.
+    """
+
+    def rows(gap_m):
+        return [(0, 0.0, 6.0, True), (1, -5.0 - gap_m, 15.5, False)]
+
+    assert chosen_among(rows(41.38)) == []
+    assert chosen_among(rows(41.42)) == [0]
 
 
 def stops_within_m(speed_mps):
@@ -86,7 +130,7 @@ def least_gap_m(front, rear, cav):
                     [(1, rear_m, rear_mps, True), (1, front_m, front_mps, False)]
                 )
                 none = np.zeros(2, np.bool_)
-                around = neighbours_in_lanes(users, lane)
+                around = neighbours_in_lanes(users, in_lanes(lane))
                 free = np.full(2, np.inf)
                 rear_mps2 = driven_mps2(users, around, at_once(users), free, none, ON_BOARD)[0]
             else:
@@ -110,7 +154,7 @@ def least_gap_m(front, rear, cav):
 def test_who_makes_way_can_stop_behind_its_new_leader_and_its_follower_behind_it(rows):
     rows = list({row[1]: row for row in rows}.values())
     users, lane = users_in(rows)
-    around = neighbours_in_lanes(users, lane)
+    around = neighbours_in_lanes(users, in_lanes(lane))
     for own in chosen_among(rows):
         _, own_m, own_mps, _ = rows[own]
         front, rear = around.front[own], around.rear[own]

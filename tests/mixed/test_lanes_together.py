@@ -59,7 +59,8 @@ def decided(situation):
         delay_s,
     )
     number = np.array([row[0] for row in rows], np.int64)
-    of_lanes, wish = Lanes(number, number < lanes - 1), np.array(wishes, np.bool_)
+    nobody = np.zeros(len(rows), np.bool_)
+    of_lanes, wish = Lanes(number, number < lanes - 1, nobody), np.array(wishes, np.bool_)
     laws = ON_BOARD, on_endless_lanes(ON_BOARD)
     obeys, accels, changes = decided_in_lanes(
         users, of_lanes, ahead, np.array(told, np.float64), wish, *laws

@@ -214,6 +214,16 @@ def test_a_driver_is_asked_for_nothing():
     assert np.isinf(room([(35.0, 20.0, True, False), (50.0, 16.0, False, True)])[0])
 
 
+@pytest.mark.parametrize(("at_m", "speed_mps"), [(192.0, 0.0), (191.6, 1.0), (195.0, 0.0)])
+def test_who_is_beside_one_that_stands_does_not_wait_for_it_to_merge_ahead(at_m, speed_mps):
+    """R stands at the lane's end, its tail at 192 m: nobody there could fall in behind it."""
+    stands = (197.0, 0.0, False, True)
+    assert math.isinf(room([(at_m, speed_mps, True, True), stands])[0])
+    assert room([(190.0, speed_mps, True, True), stands])[0] <= 0.0
+    assert room([(at_m, speed_mps, True, True), (197.0, 1.0, False, True)])[0] <= 0.0
+    assert room([(at_m, 4.0, True, True), stands])[0] <= 0.0
+
+
 def test_nobody_slows_below_a_share_of_the_lanes_speed():
     """By hand: the lane's mean is 20 m/s, six tenths are 12; B brakes to 12 in a period, no more.
 

@@ -13,6 +13,7 @@ from coramp.report.page.summary import SEVERAL_LANES, summary_of
 from coramp.report.time_space_figure import run_time_space_figure
 from coramp.scenarios.loading import load_scenario
 from tests.agency import run_by_hand
+from tests.edges import invoke
 from tests.metrics import PAPER
 from tests.networks.test_runs import new_scenario
 from tests.report.browser import chromium, in_browser, opened
@@ -92,6 +93,17 @@ def test_a_replay_draws_each_lane_apart(run, tmp_path):
         assert after["m1"] == pytest.approx(1.0, abs=0.01)
         assert "1 made way so far" in page.locator(".state").inner_text()
         assert across_px(30.0)["r1"] == pytest.approx(2.0, abs=0.01)
+
+
+@in_browser
+def test_a_diagram_begins_where_a_ramp_longer_than_the_mainline_does(tmp_path):
+    folder = tmp_path / "r"
+    longer = ("--set", "ramp.start_m=-900.0", "--strategy", "uncontrolled", "--horizon", 10)
+    assert invoke("run", "paper", *longer, "--out", folder).code == 0
+    assert invoke("report", folder).code == 0
+    path = folder / "report.html"
+    with chromium() as browser, opened(browser, f"file://{path}") as page:
+        assert page.evaluate("coramp.shown.diagrams[0].plot.scales.y.min") == -900.0
 
 
 @pytest.mark.parametrize("name", ["highway", "A10KW", "ramp"])

@@ -29,6 +29,8 @@ REMEMBERED_S = 8.0
 """A broken assumption explains what happens to the pair up to so much later."""
 STANDING_M = 0.5
 """What whoever merges leaves a driver who stands."""
+MOMENT_S = 0.25
+"""Who came into a lane no longer ago cannot have been reckoned with: a command takes 0.2 s."""
 COMFORT_MPS2 = 4.5
 """The braking by which SUMO's drivers judge gaps."""
 
@@ -150,6 +152,18 @@ def _came_in(seen: Seen) -> BoolArray:
     return np.append(False, same & (seen.lane[1:] != seen.lane[:-1]))[: len(seen.vehicle)]
 
 
+def _just_now(seen: Seen, came_in: BoolArray) -> BoolArray:
+    """Whether each row is a vehicle's that came into its lane no longer than a moment ago."""
+    found = came_in.copy()
+    for rows in range(1, len(came_in)):
+        same = seen.vehicle[rows:] == seen.vehicle[:-rows]
+        late = same & (seen.time_s[rows:] - seen.time_s[:-rows] <= MOMENT_S)
+        if not late.any():
+            break
+        found[rows:] |= late & came_in[:-rows]
+    return found
+
+
 def _braking_mps2(seen: Seen) -> FloatArray:
     """How hard each vehicle has braked in the last step, positive, 0 in its first."""
     same = seen.vehicle[1:] == seen.vehicle[:-1]
@@ -167,8 +181,8 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     """Where an automated vehicle has come in before a driver, nearer than he brakes for in comfort.
 
     He has driven on for a step, and he may have sped up in it. While he moves he has s_0 at least.
-    A driver who comes in behind it in the same step has followed it on the ramp, and judges his gap
-    himself.
+    A driver who comes in behind it in the same moment has followed it on the ramp, and judges his
+    gap himself.
     """
     own, rear = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
     share = np.maximum(0.0, seen.station_m[pairs.front] / limits.lane_end_m)
@@ -179,7 +193,7 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     needs_m = np.maximum(needs_m, near_m)
     automated = seen.automated[seen.vehicle]
     found = came_in[pairs.front] & automated[pairs.front]
-    found &= ~automated[pairs.rear] & ~came_in[pairs.rear]
+    found &= ~automated[pairs.rear] & ~_just_now(seen, came_in)[pairs.rear]
     return np.asarray(found & (pairs.gap_m < needs_m - 2.0 * EXACT_M))
 
 

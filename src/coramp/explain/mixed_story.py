@@ -125,7 +125,8 @@ def _like(last: Sequence[Row], block: Sequence[Row]) -> bool:
 
 def _chapter(run: RunRecords, drove: Drove, block: Sequence[Row], step_s: float) -> MixedChapter:
     first = block[0]
-    others = ("after", "front", "rear") if first["lane"] == "ramp" else ("after",)
+    beside = first["lane"] == "ramp" or first["changes_lane"]
+    others = ("after", "front", "rear") if beside else ("after",)
     names = [first["vehicle_id"], *(first[f"{other}_vehicle_id"] for other in others)]
     told = [name for name in dict.fromkeys(names) if name is not None]
     return MixedChapter(

@@ -9,6 +9,7 @@ from coramp.explain.mixed_gaps import Drove
 from coramp.mixed import binding as b
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
+from coramp.road.lanes import mainline_lane
 
 CRUISES, STOPS, FOLLOWS, KEEPS, TOLD, CHANGES, BROKEN = b.LAWS
 SIDES = {"front": "ahead", "rear": "behind"}
@@ -56,7 +57,9 @@ def assumed(drove: Drove) -> list[str]:
 
 def done(row: Row, drove: Drove) -> str:
     """Returns what a vehicle did at a decision, and by which law."""
-    text = place_of(row) if row["lane"] == "ramp" and not row["changes_lane"] else ""
+    text = ""
+    if not row["changes_lane"]:
+        text = place_of(row) if row["lane"] == "ramp" else _further_in(row)
     if row["law"] is None:
         return f"a driver, {text}" if text else "a driver"
     did = _changes(row) if row["changes_lane"] else _law(row, drove)
@@ -72,6 +75,12 @@ def place_of(row: Row) -> str:
     if row["after_vehicle_id"] is None:
         return "placed ahead of everybody"
     return f"placed behind {row['after_vehicle_id']}"
+
+
+def _further_in(row: Row) -> str:
+    """Returns the lane of a vehicle that is not in the lane next to the ramp."""
+    lane = mainline_lane(row["lane"])
+    return f"in lane {lane + 1} from the ramp" if lane > 0 else ""
 
 
 def _law(row: Row, drove: Drove) -> str:
@@ -107,28 +116,24 @@ def _number(value: float | None) -> str:
 
 
 def _changes(row: Row) -> str:
-    if row["lane"] == "mainline":
-        after = row["after_vehicle_id"]
-        whom = f"for {after}, which is to merge ahead of it" if after else "for who merges"
-        return (
-            f"makes way {whom}: changes to the lane further in, at station {row['station_m']:.1f} "
-            f"m and {row['speed_mps']:.1f} m/s, and need not slow down by "
-            f"{_number(-row['told_mps2'])} m/s2"
-        )
-    front, rear = row["front_vehicle_id"], row["rear_vehicle_id"]
-    where = " and ".join(
-        f"{word} {name}" for word, name in (("behind", front), ("ahead of", rear)) if name
+    beside = (("behind", row["front_vehicle_id"]), ("ahead of", row["rear_vehicle_id"]))
+    between = " and ".join(f"{word} {name}" for word, name in beside if name)
+    where = (
+        f"{between or 'where nobody is near'}, at station {row['station_m']:.1f} m and "
+        f"{row['speed_mps']:.1f} m/s"
     )
-    return (
-        f"changes to the mainline {where or 'where nobody is near'}, at station "
-        f"{row['station_m']:.1f} m and {row['speed_mps']:.1f} m/s"
-    )
+    if row["lane"] == "ramp":
+        return f"changes to the mainline {where}"
+    after, told_mps2 = row["after_vehicle_id"], row["told_mps2"]
+    whom = f"for {after}, which is to merge ahead of it" if after else "for who merges"
+    spared = "" if told_mps2 is None else f", and need not slow down by {-told_mps2:.2f} m/s2"
+    return f"makes way {whom}: changes to the lane further in {where}{spared}"
 
 
 def gaps_asked(row: Row, drove: Drove) -> list[str]:
     """Returns the gaps beside a vehicle on the acceleration lane, against what a change asks."""
     lines: list[str] = []
-    if row["law"] is None:
+    if row["law"] is None or row["lane"] != "ramp":
         return lines
     for side, word in SIDES.items():
         name = row[f"{side}_vehicle_id"]

@@ -11,10 +11,10 @@ from coramp.metrics.frames import frame_of
 from coramp.mixed.binding import LAWS
 from coramp.records.outcome import Outcome
 from coramp.records.schemas import HEARD, ON_BOARD
+from coramp.road.lanes import MAINLINE, RAMP, lane_name
 
 DIGITS = 4
 """A tenth of a millimetre is enough, and makes the files half as large."""
-LANES = ("ramp", "mainline")
 
 
 def heard_table(outcome: Outcome) -> pl.DataFrame | None:
@@ -56,9 +56,14 @@ def _named(columns: Any, names: Sequence[str]) -> dict[str, Any]:
     """Numbers of vehicles as names, lanes as words, the rest rounded."""
     named: dict[str, Any] = {name: np.round(values, DIGITS) for name, values in columns.items()}
     named["vehicle_id"] = _names(columns["vehicle"], names)
-    lanes = columns["on_mainline"].tolist()
-    named["lane"] = [None if np.isnan(lane) else LANES[int(lane)] for lane in lanes]
+    lanes = columns["lane"] if "lane" in columns else columns["on_mainline"] - 1.0
+    named["lane"] = [None if np.isnan(lane) else _lane_name(int(lane)) for lane in lanes.tolist()]
     return named
+
+
+def _lane_name(lane: int) -> str:
+    """The name of a lane by its number: -1 is the ramp with its acceleration lane."""
+    return lane_name(RAMP if lane < 0 else MAINLINE + lane)
 
 
 def _names(numbers: FloatArray, names: Sequence[str]) -> list[str | None]:

@@ -6,8 +6,12 @@ import numpy as np
 
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.mixed.laws import CourtesyLaws, FollowingLaw, SequenceLaw
+from coramp.mixed.on_board import STANDING_M
 from coramp.mixed.sequence import Sequence, sequence_of
 from coramp.mixed.users import Gaps, MixedRoad, RoadUsers, gap_for_m, gap_m
+
+STANDS_MPS = 0.1
+"""Who is slower than this stands."""
 
 
 @kernel
@@ -39,6 +43,8 @@ def courtesy_mps2(
             continue
         if not (order.virtual[k] or order.virtual[k - 1]):
             continue
+        if order.virtual[k - 1] and _is_beside(users, own, front, laws.sequence):
+            continue
         wanted_mps2 = _wanted_mps2(users, order, k, laws.gaps, following)
         merge_in_s = order.merge_in_s[own if order.virtual[k] else front]
         share = following.early_share if merge_in_s > following.early_s else 1.0
@@ -49,6 +55,17 @@ def courtesy_mps2(
             wanted_mps2 = min(0.0, max(wanted_mps2, (floor_mps - speed_mps) / period_s))
         most_mps2[own] = wanted_mps2
     return most_mps2
+
+
+@kernel
+def _is_beside(users: RoadUsers, own: int, front: int, law: SequenceLaw) -> bool:
+    """Whether one that hardly moves is beside one that stands and is to merge ahead of it.
+
+    It cannot drive backwards: the other can only merge once it has passed.
+    """
+    stand = users.speed_mps[front] < STANDS_MPS and users.speed_mps[own] < law.urgent_mps
+    tail_m = users.station_m[front] - users.length_m[front]
+    return bool(stand and tail_m - users.station_m[own] < STANDING_M)
 
 
 @kernel

@@ -32,26 +32,30 @@ GAIN_MPS2 = 0.2
 class Lanes(NamedTuple):
     """The lane of each vehicle, and whether it can change to the next one further in.
 
-    ``number`` is ``RAMP_LANE``, or that of the mainline from the outermost, 0, on.
+    ``number`` is ``RAMP_LANE``, or that of the mainline from the outermost, 0, on. ``tail`` is
+    whose rear is still before the nose, on the ramp, though the vehicle has changed lanes.
     """
 
     number: IntArray
     beside: BoolArray
+    tail: BoolArray
 
 
 @kernel
-def neighbours_in_lanes(users: RoadUsers, lane: IntArray) -> Neighbours:
+def neighbours_in_lanes(users: RoadUsers, lanes: Lanes) -> Neighbours:
     """Returns the leader of each vehicle in its lane, and who is before and behind it further in.
 
-    ``lane`` is each vehicle's: ``RAMP_LANE``, or that of the mainline from the outermost, 0, on.
+    Who has changed lanes at the nose, with its rear on the ramp, leads who comes along the ramp.
     """
-    count = len(lane)
+    lane, count = lanes.number, len(lanes.number)
     leader, front, rear = np.full(count, NOBODY), np.full(count, NOBODY), np.full(count, NOBODY)
     order = np.argsort(-users.station_m, kind="mergesort")
     last = np.full(lane.max() + 3 if count > 0 else 0, NOBODY)
     for own in order:  # front first: who came last on a lane is the next ahead
         leader[own], front[own] = last[lane[own] + 1], last[lane[own] + 2]
         last[lane[own] + 1] = own
+        if lanes.tail[own]:
+            last[RAMP_LANE + 1] = own
     last[:] = NOBODY
     for own in order[::-1]:
         rear[own] = last[lane[own] + 2]
@@ -80,7 +84,7 @@ def decided_in_lanes(
     wishes to merge; ``endless`` are the laws ``on_endless_lanes``. Who makes way obeys nothing any
     more, since what it was told is for the lane that it leaves.
     """
-    around = neighbours_in_lanes(users, lanes.number)
+    around = neighbours_in_lanes(users, lanes)
     changes = driven_and_changes(users, around, ahead, told_mps2, wishes, laws)[1]
     held = users.automated & (lanes.number == OUTERMOST) & lanes.beside
     held &= users.station_m < laws.safety.lane_end_m
@@ -124,7 +128,7 @@ def making_way(
             continue
         slowest_mps = min(users.speed_mps[own], ahead.speed_mps[own])
         slowest_mps = max(0.0, slowest_mps + min(0.0, both_mps2[own]) * endless.period_s)
-        if may_be_between(users, own, around, ahead, slowest_mps, endless):
+        if may_be_between(users, own, around, ahead, slowest_mps, endless.period_s, endless):
             found[places] = own
             places += 1
             taken[gap] = True

@@ -106,7 +106,7 @@ def may_change_lane(
     """
     if users.on_mainline[own] or users.station_m[own] < READY_M:
         return False
-    return may_be_between(users, own, around, ahead, slowest_mps, laws)
+    return may_be_between(users, own, around, ahead, slowest_mps, 0.0, laws)
 
 
 @kernel
@@ -116,11 +116,13 @@ def may_be_between(
     around: Neighbours,
     ahead: Ahead,
     slowest_mps: float,
+    until_s: float,
     laws: OnBoardLaws,
 ) -> bool:
     """Returns whether all distances are kept once a vehicle is between those beside it.
 
-    The same as for ``may_change_lane``, wherever the vehicle comes from.
+    The same as for ``may_change_lane``, wherever the vehicle comes from. It is there ``until_s``
+    from now: so long a driver behind goes on as he does, and comes nearer.
     """
     front, rear = around.front[own], around.rear[own]
     if front >= 0 and not _may_be_behind(users, own, front, own, ahead, laws):
@@ -128,7 +130,7 @@ def may_be_between(
     if rear < 0:
         return True
     if not users.automated[rear]:
-        return _leaves_driver_room(users, own, rear, slowest_mps, laws)
+        return _leaves_driver_room(users, own, rear, slowest_mps, until_s, laws)
     return _may_be_behind(users, rear, own, own, ahead, laws)
 
 
@@ -157,19 +159,21 @@ def _may_be_behind(
 
 @kernel
 def _leaves_driver_room(
-    users: RoadUsers, own: int, rear: int, slowest_mps: float, laws: OnBoardLaws
+    users: RoadUsers, own: int, rear: int, slowest_mps: float, until_s: float, laws: OnBoardLaws
 ) -> bool:
     """Whether a driver behind has what he keeps, and what braking in comfort takes.
 
     One who moves has s_0 at least, however fast the vehicle is that merges.
     """
-    safety, rear_mps = laws.safety, users.speed_mps[rear]
+    safety = laws.safety
+    rear_mps = users.speed_mps[rear] + max(0.0, users.accel_mps2[rear]) * until_s
     squares = rear_mps**2 - slowest_mps**2
     braking_m = max(squares / (2.0 * safety.driver_mps2), squares / (2.0 * safety.driver_dry_mps2))
     share = max(0.0, users.station_m[own] / safety.lane_end_m)
     relax_m = safety.relax_m + safety.relax_at_end_m * share * share
     needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - relax_m
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
+    free_m -= max(0.0, rear_mps - slowest_mps) * until_s
     near_m = min(laws.gaps.of_driver_m, _touching_m(users, rear) + laws.gaps.of_driver_s * rear_mps)
     return bool(free_m >= max(near_m, needs_m))
 

@@ -18,13 +18,11 @@ from coramp.worlds.sumo.corridor_look import (
     zone_lanes_of,
     zone_limits_of,
 )
-from coramp.worlds.sumo.corridor_record import NO_SITE, CorridorRecord
+from coramp.worlds.sumo.corridor_record import CorridorRecord
 from coramp.worlds.sumo.corridor_road import CorridorRoad
 from coramp.worlds.sumo.corridor_sites import SiteAnswer, SiteView
-from coramp.worlds.sumo.mixed_lanes import LanedPlant
+from coramp.worlds.sumo.mixed_lanes import NO_SITE, LanedPlant
 
-REFUSED_S = 1.0
-"""So long SUMO may refuse a merge of a vehicle that stands, and that the law on board allows."""
 NEVER = -1
 
 
@@ -63,8 +61,6 @@ class CorridorPlant(LanedPlant):
     _whole: Whole = field(init=False)
     _held: dict[int, str] = field(default_factory=dict)
     _held_at: IntArray = field(init=False)
-    _from_ramp: BoolArray = field(init=False)
-    _refused: dict[int, int] = field(default_factory=dict)
     _seen_at: IntArray = field(init=False)
     _looks: int = 0
 
@@ -76,7 +72,6 @@ class CorridorPlant(LanedPlant):
         self._zone_lanes = zone_lanes_of(sites, self.corridor.lanes)
         self._zone_limits = zone_limits_of(sites)
         self._held_at, self._seen_at = np.full(count, NO_SITE), np.full(count, NEVER)
-        self._from_ramp = np.zeros(count, np.bool_)
 
     def look(self, now_s: float) -> list[ZoneUsers]:
         """Returns who is in or just ahead of each zone, and takes back who has left one."""
@@ -88,7 +83,7 @@ class CorridorPlant(LanedPlant):
         self._note(now_s, found, placed, speed_mps[placed.place])
         if self.commands:
             self._release(now_s, found, placed, speed_mps)
-            self._take_over(now_s, found, placed, speed_mps)
+            self._receive(now_s, found, placed, speed_mps)
         return self._zone_users(now_s, found, placed, speed_mps, accel_mps2)
 
     def _found(self) -> Found:
@@ -144,9 +139,8 @@ class CorridorPlant(LanedPlant):
         held = np.fromiter(self._held, np.int64, len(self._held))
         for n in held[self.record.site_of(held) != self._held_at[held]].tolist():
             k, name = int(self._held_at[n]), self._held.pop(n)
-            self._refused.pop(n, None)
             self._held_at[n] = NO_SITE
-            self._changing[n] = self._from_ramp[n] = False
+            self._forget_change(n)
             self._motion.sent_mps[n] = self._motion.sent_m[n] = np.nan
             if self._seen_at[n] != self._looks:
                 self.session.release(name)  # beyond what is seen, or out of the network
@@ -160,7 +154,7 @@ class CorridorPlant(LanedPlant):
                 at = (float(placed.station_m[entry]), float(placed.lane[entry]))
             self.record.hand_over(now_s, n, k, False, (*at, float(speed_mps[i])))
 
-    def _take_over(self, now_s: float, found: Found, placed: Placed, speed_mps: FloatArray) -> None:
+    def _receive(self, now_s: float, found: Found, placed: Placed, speed_mps: FloatArray) -> None:
         """Notes who enters a zone, and is commanded from now on."""
         number = found.number[placed.place]
         enters = placed.inside & self.able.automated[number] & (self._held_at[number] == NO_SITE)
@@ -169,7 +163,6 @@ class CorridorPlant(LanedPlant):
             self._held[n] = found.names[i]
             self._held_at[n] = k
             self.actuators.begin(n)
-            self._from_ramp[n] = placed.lane[entry] == RAMP_LANE
             at = float(placed.station_m[entry]), float(placed.lane[entry])
             self.record.hand_over(now_s, n, k, True, (*at, float(speed_mps[i])))
 
@@ -200,7 +193,7 @@ class CorridorPlant(LanedPlant):
         names = [found.names[i] for i in place.tolist()]
         self._whole = Whole(names, users, placed.lane, placed.inside)
         may_leave = placed.beside & (placed.lane == RAMP_LANE) & placed.inside
-        ahead = self.ahead(users)
+        ahead, tail = self.ahead(users), self._tails(users, placed.lane, placed.site)
         zones = []
         for k in range(len(placed.first) - 1):
             own = placed.of_site(k)
@@ -211,37 +204,10 @@ class CorridorPlant(LanedPlant):
                 placed.beside[own],
                 may_leave[own],
                 ahead._replace(way_m=ahead.way_m[own], speed_mps=ahead.speed_mps[own]),
+                tail[own],
             )
             zones.append(ZoneUsers(names[own], view))
         return zones
-
-    def _settle(self, names: Sequence[str], users: RoadUsers) -> None:
-        """Has SUMO judge gaps as usual for who has come from the ramp onto the mainline.
-
-        Where the mainline is empty far and wide SUMO changes lanes by itself, without a command.
-        On the ramp SUMO finds no gap for a vehicle, and nobody could change in before it.
-        """
-        came = users.on_mainline & users.automated & self._from_ramp[users.number]
-        for i in np.flatnonzero(came).tolist():
-            n = int(users.number[i])
-            self._from_ramp[n] = False
-            self._refused.pop(n, None)
-            self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
-            self.session.take_over(names[i])
-
-    def _change_lane(self, name: str) -> None:
-        """Has a vehicle change to the next lane further in, as SUMO allows.
-
-        SUMO refuses gaps below the standstill gap of who is behind. Where both stand on less, which
-        the law on board allows, neither would ever go on: then it changes without SUMO's check.
-        """
-        number = self.able.number[name]
-        if self._from_ramp[number] and self._motion.sent_mps[number] == 0.0:
-            tried = self._refused[number] = self._refused.get(number, 0) + 1
-            if tried * self.period_s > REFUSED_S:
-                self.session.change_lane_now(name, self.period_steps)
-                return
-        super()._change_lane(name)
 
     def obey(self, answers: Sequence[SiteAnswer]) -> None:
         """Has the automated vehicles of all zones do what their coordinators answer."""
@@ -250,6 +216,5 @@ class CorridorPlant(LanedPlant):
         users = RoadUsers._make([column[inside] for column in whole.users])
         changes = np.concatenate([answer.changes for answer in answers])[inside]
         accel_mps2 = np.concatenate([answer.accel_mps2 for answer in answers])[inside]
-        self._settle(names, users)
         self.record.change(users.number[changes & (whole.lane[inside] >= OUTERMOST)].tolist())
         self.command(names, users, accel_mps2, changes)

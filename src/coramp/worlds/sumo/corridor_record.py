@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.worlds.sumo.mixed_lanes import NO_SITE
 from coramp.worlds.sumo.network import RAMP_LANE
 
 HARD_MPS2 = 3.0
 STOPPED_MPS = 0.1
-NO_SITE = -1
 PASSAGE = (
     "site", "number", "on_ramp", "entered_s", "left_s", "merged_s", "hard_brakings", "stopped",
     "changes",

@@ -48,8 +48,9 @@ class SiteSetup(NamedTuple):
 class SiteView(NamedTuple):
     """What a site's coordinator is told at ``now_s``: who is in its zone, and who is just ahead.
 
-    ``lane`` and ``beside`` are as in ``LanedPlant``. ``able`` is who is on the acceleration lane
-    and can leave it. ``ahead`` is where each will be when a command begins to act.
+    ``lane``, ``beside`` and ``tail`` are as in ``LanedPlant``. ``able`` is who is on the
+    acceleration lane and can leave it. ``ahead`` is where each will be when a command begins to
+    act.
     """
 
     now_s: float
@@ -58,6 +59,7 @@ class SiteView(NamedTuple):
     beside: BoolArray
     able: BoolArray
     ahead: Ahead
+    tail: BoolArray
 
 
 class SiteAnswer(NamedTuple):
@@ -74,6 +76,7 @@ class _Shown:
     period_s: float
     lane: IntArray
     beside: BoolArray
+    tail: BoolArray
     now: Ahead
 
     def ahead(self, _users: RoadUsers) -> Ahead:
@@ -87,10 +90,9 @@ class SiteCoordinator:
     def __init__(self, setup: SiteSetup) -> None:
         name = setup.strategy
         strategy = strategy_to_run(name, setup.scenario.strategy.get(name))
+        nowhere = np.empty(0, np.bool_)
         nobody = Ahead(np.empty(0), np.empty(0), 0.0)
-        self._shown = _Shown(
-            setup.laws.period_s, np.empty(0, np.int64), np.empty(0, np.bool_), nobody
-        )
+        self._shown = _Shown(setup.laws.period_s, np.empty(0, np.int64), nowhere, nowhere, nobody)
         self._air = Air(
             setup.scenario,
             setup.reporting,
@@ -112,7 +114,8 @@ class SiteCoordinator:
         if not users.automated.any():
             return SiteAnswer(np.zeros(len(users.number)), np.zeros(len(users.number), np.bool_))
         shown = self._shown
-        shown.lane, shown.beside, shown.now = view.lane, view.beside, view.ahead
+        shown.lane, shown.beside, shown.tail = view.lane, view.beside, view.tail
+        shown.now = view.ahead
         moment = self._control.decided(view.now_s, [], view.able, users)
         driven = self._control.driven(moment, shown)
         return SiteAnswer(driven.accel_mps2, driven.changes)

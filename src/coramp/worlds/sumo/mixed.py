@@ -10,6 +10,7 @@ from typing import NamedTuple
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
+from coramp.mixed.lanes import Lanes
 from coramp.mixed.laws import OnBoardLaws
 from coramp.mixed.on_board import Ahead, Neighbours, driven_and_changes, neighbours_of
 from coramp.mixed.situation import MixedSituation, MixedStrategy, Places, Steering
@@ -258,6 +259,15 @@ class Control:
         self, moment: Moment, ahead: Ahead, accel_mps2: FloatArray, changes: BoolArray
     ) -> None:
         """Notes what vehicles do, if anything is noted."""
+        self._note(moment, ahead, (accel_mps2, changes), None)
+
+    def _note(
+        self,
+        moment: Moment,
+        ahead: Ahead,
+        driven: tuple[FloatArray, BoolArray],
+        lanes: Lanes | None,
+    ) -> None:
         if self.notes is not None:
-            known, driven = (self.air, self.places, self.laws), (accel_mps2, changes)
-            self.notes.driven(moment.now_s, moment.users, ahead, driven, known)
+            known = self.air, self.places, self.laws
+            self.notes.driven(moment.now_s, (moment.users, lanes), ahead, driven, known)

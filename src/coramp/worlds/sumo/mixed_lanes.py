@@ -18,8 +18,12 @@ from coramp.worlds.sumo.mixed import Control, Driven, Moment
 from coramp.worlds.sumo.mixed_plant import Foresees, MixedPlant
 from coramp.worlds.sumo.network import LaneSpan
 
+NO_SITE = -1
+"""Of who has not come by a ramp; sites are counted from 0."""
 TO_LANE_END_M = 1.0
 """Nobody is told to change lanes who would come so near to his lane's end within a period."""
+REFUSED_S = 1.0
+"""So long SUMO may refuse a merge of a vehicle that stands, and that the law on board allows."""
 
 
 @dataclass
@@ -28,14 +32,22 @@ class LanedPlant(MixedPlant):
 
     ``lane`` is the number of each user's lane at the last look, from the outermost of the mainline
     on, or ``RAMP_LANE``; ``beside`` is who can change from it to the next one further in, and stays
-    beside that for another period. Each cruises no faster than the limits where it is, and ahead,
-    let it.
+    beside that for another period; ``tail`` is whose rear is still on the ramp. Each cruises no
+    faster than the limits where it is, and ahead, let it.
     """
 
     road: LanedRoad | None = None
     lane: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     beside: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
+    tail: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))
+    _came_by: IntArray = field(init=False)
     _table: "_Table | None" = None
+    _refused: dict[int, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Nobody has been seen on a ramp yet."""
+        super().__post_init__()
+        self._came_by = np.full(len(self.able.automated), NO_SITE)
 
     def is_on(self, road: LanedRoad) -> None:
         """Is told its road."""
@@ -69,7 +81,20 @@ class LanedPlant(MixedPlant):
         # a lane's number is another one beyond its end, so that nobody is told of it near there
         stays = station_m + speed_mps * self.period_s + TO_LANE_END_M < table.end_m[place]
         self.beside = table.changes[place] & stays
+        self.tail = self._tails(users, self.lane)
         return names, may_leave, users
+
+    def _tails(self, users: RoadUsers, lane: IntArray, site: IntArray | None = None) -> BoolArray:
+        """Returns whose rear is still on the ramp of its site, though it has left the ramp's lane.
+
+        It is no more on the ramp for SUMO, but stands in the way of who comes along it. ``site`` is
+        the site of each user; without it there is one.
+        """
+        site = np.zeros(len(lane), np.int64) if site is None else site
+        on_ramp = lane == RAMP_LANE
+        self._came_by[users.number[on_ramp]] = site[on_ramp]
+        over_the_nose = (lane > RAMP_LANE) & (users.station_m < users.length_m)
+        return np.asarray(over_the_nose & (self._came_by[users.number] == site))
 
     def _allowed_mps(self, station_m: FloatArray) -> FloatArray:
         """What the limits of each one's road let it drive."""
@@ -79,9 +104,24 @@ class LanedPlant(MixedPlant):
         return np.where(self.lane > RAMP_LANE, mainline_mps, ramp_mps)
 
     def _change_lane(self, name: str) -> None:
-        """Has a vehicle change to the next lane further in; SUMO refuses what would collide."""
+        """Has a vehicle change to the next lane further in, as SUMO allows.
+
+        SUMO refuses gaps below the standstill gap of who is behind. Where both stand on less, which
+        the law on board allows, neither would ever go on: then it changes without SUMO's check.
+        """
+        number = self.able.number[name]
+        if self._from_ramp[number] and self._motion.sent_mps[number] == 0.0:
+            tried = self._refused[number] = self._refused.get(number, 0) + 1
+            if tried * self.period_s > REFUSED_S:
+                self.session.change_lane_now(name, self.period_steps)
+                return
         time_s = (self.period_steps - 1) * self.step_s
         self.session.change_lane_if_clear(name, max(time_s, self.step_s))
+
+    def _forget_change(self, number: int) -> None:
+        """Is told that a vehicle neither merges nor changes lanes any more."""
+        super()._forget_change(number)
+        self._refused.pop(number, None)
 
 
 class _Table(NamedTuple):
@@ -119,10 +159,11 @@ def allowed_mps(limits: Limits, station_m: FloatArray) -> FloatArray:
 
 
 class InLanes(Protocol):
-    """What a control asks of the plant on several lanes: each user's lane, and who can change."""
+    """What a control asks of the plant on several lanes, as ``LanedPlant`` has it."""
 
     lane: IntArray
     beside: BoolArray
+    tail: BoolArray
 
 
 @dataclass
@@ -157,15 +198,15 @@ class LanedControl(Control):
         return self.plant.lane
 
     @property
-    def _beside(self) -> BoolArray:
+    def _lanes(self) -> Lanes:
         assert self.plant is not None
-        return self.plant.beside
+        return Lanes(self.plant.lane, self.plant.beside, self.plant.tail)
 
     def driven(self, moment: Moment, plant: Foresees) -> Driven:
         """Returns what vehicles are told, as far as it arrives, and what they do on board."""
         users, laws, endless = moment.users, self.laws, self._endless
         most_mps2, may_merge = self._told(moment, self._lane)
-        lanes = Lanes(self._lane, self._beside)
+        lanes = self._lanes
         wishes = may_merge & moment.able & users.automated & (lanes.number == RAMP_LANE)
         obeys_mps2, accel_mps2, changes = decided_in_lanes(
             users, lanes, plant.ahead(users), most_mps2, wishes, laws, endless
@@ -181,19 +222,14 @@ class LanedControl(Control):
         own = _chosen(users, outer) if moment.outer is None else moment.outer
         most_mps2[outer], may_merge[outer] = self.air.told(moment.now_s, own)
         if self.notes is not None:
-            self.notes.told(moment.now_s, own, moment.seen, most_mps2[outer], self.air)
+            self.notes.told(moment.now_s, own, moment.seen, most_mps2, self.air)
         return most_mps2, may_merge
 
     def note(
         self, moment: Moment, ahead: Ahead, accel_mps2: FloatArray, changes: BoolArray
     ) -> None:
-        """Notes what those of the outer lanes do, if anything is noted."""
-        if self.notes is None:
-            return
-        outer = self._lane <= OUTERMOST
-        own = moment._replace(users=_chosen(moment.users, outer))
-        there = Ahead(ahead.way_m[outer], ahead.speed_mps[outer], ahead.delay_s)
-        super().note(own, there, accel_mps2[outer], changes[outer])
+        """Notes what those of all lanes do, if anything is noted."""
+        self._note(moment, ahead, (accel_mps2, changes), self._lanes)
 
 
 def _chosen(users: RoadUsers, chosen: BoolArray) -> RoadUsers:

@@ -9,6 +9,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.mixed.binding import binding_laws
+from coramp.mixed.lanes import Lanes, neighbours_in_lanes
 from coramp.mixed.laws import OnBoardLaws
 from coramp.mixed.on_board import Ahead, neighbours_of
 from coramp.mixed.situation import Places
@@ -18,7 +19,7 @@ from coramp.worlds.faults.heard import HeardRecord
 from coramp.worlds.sumo.files import SumoOptions
 
 COLUMNS = (
-    *("time_s", "vehicle", "station_m", "speed_mps", "measured_mps2", "on_mainline", "law"),
+    *("time_s", "vehicle", "station_m", "speed_mps", "measured_mps2", "lane", "law"),
     "accel_mps2",
     *("told_mps2", "given_s", "fallback", "place", "after", "changes", "ahead_m", "ahead_mps"),
     *("leader", "leader_gap_m", "leader_speed_mps", "leader_accel_mps2"),
@@ -29,27 +30,35 @@ COLUMNS = (
 
 @dataclass
 class OnBoardRecord:
-    """One row a decision and automated vehicle, and driver on the ramp: what it does and why."""
+    """One row a decision and automated vehicle, and driver on the ramp: what it does and why.
+
+    Lanes are those of ``Lanes``: -1 for the ramp, 0 for the mainline's lane next to it.
+    """
 
     _rows: list[FloatArray] = field(default_factory=list)
 
     def note(
         self,
         now_s: float,
-        users: RoadUsers,
+        placed: tuple[RoadUsers, Lanes | None],
         ahead: Ahead,
         given: tuple[RoadUsers, FloatArray, Air, Places],
         driven: tuple[FloatArray, BoolArray],
         laws: OnBoardLaws,
     ) -> None:
-        """Notes what was ``given``, with whom the coordinator knew and where it placed them."""
-        seen, told_mps2, air, places = given
+        """Notes what was ``given``, with whom the coordinator knew and where it placed them.
+
+        ``placed`` are all users and, where there are several lanes, on which they are.
+        """
+        (users, lanes), (seen, told_mps2, air, places) = placed, given
         accel_mps2, changes = driven
-        around = neighbours_of(users)
-        law = binding_laws(users, around, ahead, told_mps2, changes, laws, accel_mps2)
+        around = neighbours_of(users) if lanes is None else neighbours_in_lanes(users, lanes)
+        makes_way = changes & users.on_mainline
+        obeys_mps2 = np.where(makes_way, np.inf, told_mps2)
+        law = binding_laws(users, around, ahead, obeys_mps2, changes, laws, accel_mps2)
         place, after = order_of(seen, places, len(air.reporting))
         number = users.number
-        beside = ~users.on_mainline & (users.station_m > 0.0)
+        beside = makes_way | (~users.on_mainline & (users.station_m > 0.0))
         rows = np.column_stack(
             [
                 np.full(len(number), now_s),
@@ -57,7 +66,7 @@ class OnBoardRecord:
                 users.station_m,
                 users.speed_mps,
                 users.accel_mps2,
-                users.on_mainline,
+                users.on_mainline - 1.0 if lanes is None else lanes.number,
                 law,
                 np.where(users.automated, accel_mps2, np.nan),
                 np.where(np.isfinite(told_mps2), told_mps2, np.nan),
@@ -130,7 +139,7 @@ class Notes:
     def told(
         self, now_s: float, users: RoadUsers, seen: RoadUsers, told_mps2: FloatArray, air: Air
     ) -> None:
-        """Notes what was known when vehicles were told how much they may speed up."""
+        """Notes what was known of users when vehicles were told how much they may speed up."""
         self._told = seen, told_mps2
         if self.heard is not None:
             self.heard.note(now_s, users, seen, air)
@@ -138,16 +147,19 @@ class Notes:
     def driven(
         self,
         now_s: float,
-        users: RoadUsers,
+        placed: tuple[RoadUsers, Lanes | None],
         ahead: Ahead,
         driven: tuple[FloatArray, BoolArray],
         control: tuple[Air, Places, OnBoardLaws],
     ) -> None:
-        """Notes what vehicles do: accelerations (m/s2), and who changes lanes."""
+        """Notes what vehicles do: accelerations (m/s2), and who changes lanes.
+
+        ``placed`` are the vehicles and, on a road of several lanes, their lanes.
+        """
         if self.on_board is None or self._told is None:
             return
         air, places, laws = control
-        self.on_board.note(now_s, users, ahead, (*self._told, air, places), driven, laws)
+        self.on_board.note(now_s, placed, ahead, (*self._told, air, places), driven, laws)
 
 
 def notes_of(options: SumoOptions, air: Air) -> Notes | None:

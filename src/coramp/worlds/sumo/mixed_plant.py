@@ -54,6 +54,7 @@ class MixedPlant:
     actuators: SlowActuators
     _motion: Motion = field(init=False)
     _changing: BoolArray = field(init=False)
+    _from_ramp: BoolArray = field(init=False)
     _lane_numbers: dict[str, int] = field(init=False)
     _starts_m: FloatArray = field(init=False)
     _on_mainline: BoolArray = field(init=False)
@@ -69,7 +70,7 @@ class MixedPlant:
             accel_mps2=np.zeros(count),
             largest_error_m=np.where(self.able.automated, 0.0, np.nan),
         )
-        self._changing = np.zeros(count, np.bool_)
+        self._changing, self._from_ramp = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         lanes = list(self.lane_starts_m)
         self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
         self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
@@ -132,17 +133,9 @@ class MixedPlant:
         """Takes over who is new, and has vehicles change lanes; then all drive for a period."""
         own = np.flatnonzero(users.automated)
         number = users.number[own]
-        new = np.isnan(self._motion.sent_mps[number])
-        for i in own[new].tolist():
-            if users.on_mainline[i]:
-                self.session.take_over(names[i])
-                continue
-            self.session.take_over_among_drivers(names[i])
-            self.session.judge_gaps_by(names[i], NO_GAP_M, NOT_ASSERTIVE)
-        changed = users.on_mainline[own] & self._changing[number]
-        for i in own[changed].tolist():
-            self.session.take_over(names[i])
-        self._changing[number[changed]] = False
+        for i in own[np.isnan(self._motion.sent_mps[number])].tolist():
+            self._take_over(names[i], int(users.number[i]), bool(users.on_mainline[i]))
+        self._settle(names, users, own, changes)
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self._change_lane(names[i])
@@ -151,6 +144,40 @@ class MixedPlant:
         self._motion.sent_m[number] = users.station_m[own]
         self._motion.sent_mps[number] = users.speed_mps[own]
         self._drive(chosen, number, accel_mps2[own])
+
+    def _take_over(self, name: str, number: int, on_mainline: bool) -> None:
+        """Takes over a vehicle; SUMO has drivers make room for one that is still to merge."""
+        if on_mainline:
+            self.session.take_over(name)
+            return
+        self._from_ramp[number] = True
+        self.session.take_over_among_drivers(name)
+        self.session.judge_gaps_by(name, NO_GAP_M, NOT_ASSERTIVE)
+
+    def _settle(
+        self, names: Sequence[str], users: RoadUsers, own: IntArray, changes: BoolArray
+    ) -> None:
+        """Has who came from the ramp or was to change drive as all do in the lane where it is.
+
+        Where the mainline is empty far and wide SUMO changes lanes by itself, without a command:
+        there gaps are judged as usual from then on, or nobody could change in before it. For one
+        whose merge SUMO refused, and that merges no more, drivers make room again.
+        """
+        number, on_mainline = users.number[own], users.on_mainline[own]
+        changing = self._changing[number]
+        arrived = on_mainline & (changing | self._from_ramp[number])
+        for i in own[arrived].tolist():
+            if not self._changing[users.number[i]]:
+                self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
+            self.session.take_over(names[i])
+            self._forget_change(int(users.number[i]))
+        for i in own[changing & ~on_mainline & ~changes[own]].tolist():
+            self._changing[users.number[i]] = False
+            self._take_over(names[i], int(users.number[i]), on_mainline=False)
+
+    def _forget_change(self, number: int) -> None:
+        """Is told that a vehicle neither merges nor changes lanes any more."""
+        self._changing[number] = self._from_ramp[number] = False
 
     def _change_lane(self, name: str) -> None:
         """Has a vehicle on the acceleration lane change to the mainline beside it."""

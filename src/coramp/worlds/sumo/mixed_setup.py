@@ -7,7 +7,7 @@ import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
-from coramp.mixed.laws import LANE_END_M, FollowingLaw, OnBoardLaws, SafetyLaw
+from coramp.mixed.laws import LANE_END_M, FollowingLaw, OnBoardLaws, SafetyLaw, SequenceLaw
 from coramp.mixed.users import Gaps, MixedRoad
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
@@ -19,6 +19,11 @@ MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.15
 """How much more than behind an automated vehicle one keeps behind a driver."""
 MORE_FOR_DRIVER_S = 0.25
 """How much more than a driver's own gap room for one who merges has."""
+KEPT_HALFWAY = SequenceLaw().slowest_share
+"""Half-way along the acceleration lane a vehicle may still have this share of the mainline's speed.
+
+That is what vehicles behind slow down to for it.
+"""
 TRUCK_BRAKING_MPS2 = 5.0
 """What the brakes of a heavy vehicle must do (UN Regulation 13, type 0 test)."""
 YIELDED_TO = 'lcCooperative="1"'
@@ -58,15 +63,18 @@ def safety_law_of(scenario: Scenario, period_s: float) -> SafetyLaw:
     """Returns what automated vehicles keep on board on this road, commanded once a period.
 
     They react no sooner than at their next command. Drivers move in Euler steps, in which one
-    that brakes from v comes to a stand v h / 2 earlier than by v^2 / (2 b).
+    that brakes from v comes to a stand v h / 2 earlier than by v^2 / (2 b). Where the mainline is
+    fast and the acceleration lane short, who is to merge relies on harder braking before its end.
     """
     law = SafetyLaw().on(scenario.road.assumed_braking_mps2)
     shorter_m = 0.5 * scenario.mainline.limit_mps * scenario.control.step_s
     end_m = scenario.ramp.acceleration_lane_m - LANE_END_M
+    halfway_mps = KEPT_HALFWAY * scenario.mainline.speed_mps
     return law._replace(
         reaction_s=max(law.reaction_s, period_s),
         margin_m=max(law.margin_m, shorter_m),
         lane_end_m=end_m,
+        stop_mps2=max(law.stop_mps2, min(law.driver_mps2, halfway_mps**2 / end_m)),
     )
 
 

@@ -11,7 +11,8 @@ coramp.Diagram = class {
     this.selected = null;
     this.time = 0;
     this.lines = new Map();
-    this.full = { x: [0, run.end_s], y: [run.road.start_m, run.road.end_m] };
+    const { start_m: start, ramp_start_m: ramp, end_m: end } = run.road;
+    this.full = { x: [0, run.end_s], y: [Math.min(start, ramp), end] };
     this.build();
   }
 

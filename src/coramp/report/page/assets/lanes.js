@@ -121,11 +121,6 @@ coramp.Replay = class extends coramp.Replay {
 coramp.Diagram = class extends coramp.Diagram {
   static FAINT = 0.14;
 
-  build() {
-    this.full.y[0] = Math.min(this.full.y[0], this.run.road.ramp_start_m);
-    super.build();
-  }
-
   tools() {
     const tools = super.tools();
     const count = coramp.lanesOf(this.run);
