@@ -17,7 +17,12 @@ from coramp.errors import CorampError
 from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
-from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_drivers
+from coramp.runs.mixed import (
+    broken_among_drivers,
+    check_mixed,
+    coordinates_drivers,
+    plans_in_lanes,
+)
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
@@ -96,7 +101,8 @@ class RunSpec:
         coordinates = strategy_named(self.strategy).cooperative
         scenario = self.scenario
         other = scenario.is_mixed or scenario.has_faults or not scenario.has_one_lane
-        return coordinates and other and scenario.has_automated
+        planned = self.engine == "exact"
+        return coordinates and other and scenario.has_automated and not planned
 
     @property
     def settings(self) -> str | None:
@@ -159,6 +165,8 @@ def make_spec(
         raise CorampError(loaded.signal_problem)
     population = None
     among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
+    if among_drivers and plans_in_lanes(loaded, chosen, engine):
+        among_drivers = False
     if drivers is not None or not chosen.cooperative or among_drivers:
         population = drivers_checked(loaded, drivers or loaded.traffic.drivers)
     if among_drivers or (loaded.gives_shares and not chosen.cooperative):
