@@ -20,7 +20,7 @@ from coramp.kinematics.trajectory import (
 )
 from coramp.motion.approach import approach_without_stop, brake_and_go, late_approach, late_start
 from coramp.road.rules import Rules, unpacked
-from coramp.strategies.make_way import can_leave_in_time, has_room_further_in, propose_change
+from coramp.strategies.make_way import Asked, propose_change, way_further_in
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,
@@ -42,7 +42,6 @@ from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, wi
 from coramp.vehicles.trace import (
     CURRENT,
     MOVES_MORE,
-    NO_EASY_WAY,
     NO_LATE_WAY,
     give_preference,
     note_choice,
@@ -164,18 +163,16 @@ def rung_make_way(
     With ``free_alone`` the subject keeps its free movement, else it is tried first. Returns who
     makes way too, -1 for nobody.
     """
-    open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, -1, -1)
     row = nearest_at_merge(fleet, subject, rules)
     if row < 0:
-        refuse(proposal.trace, NO_EASY_WAY, -1, math.nan)
         return no_unequal_merge(), -1
     nose_s = subject.approach[len(subject.approach) - 1, TIME]
     traits = fleet.traits[row]
     clearance_m = merge_clearance_m(rules.road, pair_safety(traits, traits, rules.safety))
-    in_time = can_leave_in_time(fleet, proposal, row, subject.from_s, nose_s)
-    if not in_time or not has_room_further_in(
-        fleet, proposal, row, subject.from_s, subject.known_m, clearance_m, rules
-    ):
+    asked = Asked(row, -1, -1, subject.from_s, nose_s, subject.known_m, clearance_m)
+    way = np.empty((MAX_PIECES, 4))
+    n = way_further_in(fleet, proposal, asked, rules, way)
+    if n == 0:
         return no_unequal_merge(), -1
     leaving = with_change(fleet, row, subject.from_s)
     for k in range(-1, 0 if free_alone else ACCELERATIONS):
@@ -184,7 +181,7 @@ def rung_make_way(
             open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, -1, -1)
         merge = _try_by(leaving, proposal, subject, subject.approach, accel_mps2, False, rules)
         if merge.done:
-            propose_change(fleet, proposal, row, subject.from_s)
+            propose_change(fleet, proposal, row, way[:n])
             return merge, row
     return no_unequal_merge(), -1
 
