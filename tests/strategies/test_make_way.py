@@ -43,9 +43,9 @@ def cruise(intercept_m):
     return pieces(0.0, intercept_m, 20.0), STREAM
 
 
-def traffic(*further_in_m, subject=None, conflict=None, changes_s=math.inf):
+def traffic(*further_in_m, subject=None, conflict=None, changes_s=math.inf, front_m=-196.0):
     """R, X, C, Y and one behind it on the outer lane; others further in."""
-    outer = [ramp() if subject is None else subject, cruise(-196.0)]
+    outer = [ramp() if subject is None else subject, cruise(front_m)]
     outer += [cruise(-204.0) if conflict is None else conflict]
     outer += [cruise(-212.0), cruise(-220.0), cruise(-228.0)]
     everyone = [*outer, *map(cruise, further_in_m)]
@@ -58,6 +58,12 @@ def traffic(*further_in_m, subject=None, conflict=None, changes_s=math.inf):
 def plan(planner, fleet, rules=LANES):
     found, proposal, _, _ = planner(fleet, R, 0.0, 20.0, packed(rules))
     return found, proposal
+
+
+def tried(proposal):
+    """What was tried by the rung make way."""
+    count = int(proposal.trace[0, t.COUNT])
+    return [row for row in proposal.trace[1 : count + 1] if row[t.RUNG] == RUNG_MAKE_WAY]
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -89,10 +95,34 @@ def test_it_changes_only_where_both_gaps_further_in_are_long_enough(ahead, more_
     found, proposal = plan(plan_with_mainline_priority, traffic(other_m))
     assert found.rung == rung
     if rung == RUNG_CREATE:
-        refused = [row for row in proposal.trace[1:10] if row[t.RUNG] == RUNG_MAKE_WAY]
-        assert [row[t.REASON] for row in refused] == [t.TOO_NEAR]
+        refused = tried(proposal)
+        assert [row[t.REASON] for row in refused] == [t.TOO_NEAR, t.NO_GAP_FURTHER_IN]
         assert (refused[0][t.MOVED], refused[0][t.OTHER]) == (C, 6)
         assert refused[0][t.MISSING] == pytest.approx(-more_m, abs=1e-9)
+
+
+def test_who_is_slower_than_the_next_lane_goes_back_to_its_speed_at_once():
+    # C falls back 14 m by 8 s; who follows further in has 8 m to spare, of which 1.53 m are lost
+    slow = pieces(0.0, -190.0, 18.0, [(18.0, 6.0), (20.0, 2.0)]), STREAM
+    fleet = traffic(-203.14, conflict=slow, front_m=-176.0)
+    found, proposal = plan(plan_with_mainline_priority, fleet)
+    assert found.rung == RUNG_MAKE_WAY
+    way = proposal.pieces[1, : proposal.piece_count[1]]
+    assert way[:, 2:] == close(np.array([[18.0, 1.5], [20.0, 0.0]]))
+    assert proposal.lane_change_s[1] == 0.1
+    assert [row[t.REASON] for row in tried(proposal)] == [t.TOO_NEAR, t.CHOSEN]
+
+
+def test_who_has_somebody_beside_it_moves_to_a_gap_and_changes_as_late_as_it_can():
+    # who is 3 m behind C further in needs 5.14 m: C moves ahead 4 m, towards X 11 m away
+    found, proposal = plan(plan_with_mainline_priority, traffic(-207.0, front_m=-188.0))
+    assert found.rung == RUNG_MAKE_WAY
+    assert (found.merge_time_s, found.largest_shift_m) == (close(12.0), 4.0)
+    assert proposal.lane_change_s[1] == close(10.0 - 4.5)
+    way = proposal.pieces[1, : proposal.piece_count[1]]
+    assert way[-1, 1] - 20.0 * way[-1, 0] == close(-200.0)
+    assert way[-1, 0] == close(5.5)
+    assert [row[t.REASON] for row in tried(proposal)] == [t.TOO_NEAR, t.CHOSEN]
 
 
 def test_who_is_gone_before_the_nose_is_reached_is_in_nobodys_way():
@@ -124,9 +154,7 @@ def test_why_a_vehicle_cannot_make_way(fleet, rules, reason):
     conflict = conflict_position(fleet, situation, rules)
     assert situation.order[conflict] == C
     assert make_way(fleet, proposal, situation, conflict, False, rules).gap == -1
-    tried = proposal.trace[int(proposal.trace[0, t.CURRENT])]
-    assert tried[t.RUNG] == RUNG_MAKE_WAY
-    assert tried[t.REASON] == getattr(t, reason)
+    assert tried(proposal)[0][t.REASON] == getattr(t, reason)
 
 
 def test_a_vehicle_that_changes_lanes_is_not_moved_aside():

@@ -46,6 +46,7 @@ _BY_VEHICLE = {
     a.REASONS[t.CANNOT_FOLLOW]: "it cannot follow {} at a safe distance",
     a.REASONS[t.LEAVES_LANE]: "{} is changing lanes already",
     a.REASONS[t.NOT_ON_MAINLINE]: "{} is still on the ramp",
+    a.REASONS[t.NO_GAP_FURTHER_IN]: "{} cannot move to a gap further in",
     a.REASONS[t.CHANGE_TOO_LATE]: "{} could not change lanes before it reaches the nose",
 }
 """Reasons that name the vehicle which cannot do its part."""

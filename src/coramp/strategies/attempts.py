@@ -37,6 +37,7 @@ REASONS = {
     t.LEAVES_LANE: "a vehicle that would move is changing lanes",
     t.NOT_ON_MAINLINE: "the vehicle in conflict is still on the ramp",
     t.CHANGE_TOO_LATE: "the vehicle in conflict could not change lanes before the nose is reached",
+    t.NO_GAP_FURTHER_IN: "the vehicle in conflict cannot move to a gap further in",
     t.HOLDS_UP_FURTHER_IN: "a vehicle that is yet to enter further in would be held up",
 }
 """Why an attempt failed, by the codes of ``vehicles.trace``."""

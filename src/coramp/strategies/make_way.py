@@ -1,7 +1,8 @@
 """The rung make way: the vehicle in conflict changes to the next lane further in.
 
-It keeps its own way along the road, or goes back to its cruise at once. It leaves as soon as it can
-act, and counts on both lanes until it has changed. The subject then takes the gap that it leaves.
+It counts on both lanes until it has changed, before the subject reaches the nose, and the subject
+takes the gap that it leaves. If it can, it keeps its own way along the road and leaves as soon as
+it can act. Else it goes back to its cruise, or moves to a gap further in before it changes.
 """
 
 import math
@@ -12,20 +13,21 @@ import numpy as np
 from coramp._kernel import FloatArray, kernel
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
-    STATION,
-    TIME,
     begin,
     clip_start,
     drive_to_speed,
     intercept_range_m,
+    largest_acceleration_mps2,
+    speed_range_mps,
     station_and_speed,
+    superpose_shift,
 )
 from coramp.motion.following import speed_up
 from coramp.road.lanes import LANE_CHANGE_LASTS_S
 from coramp.road.rules import Rules
 from coramp.strategies.ladder import plan_about, station_at_decision_m
 from coramp.strategies.proposals import largest_safe_distance_m
-from coramp.strategies.rungs import Merge, merge_at, no_merge, reach_as, refuse_gap
+from coramp.strategies.rungs import Merge, merge_at, no_merge, reach_as
 from coramp.strategies.situation import RUNG_MAKE_WAY, MergePlan, Situation, gap_bounds_m
 from coramp.vehicles.fleet import (
     ROUNDING_M,
@@ -44,15 +46,24 @@ from coramp.vehicles.merge_state import BY_MAINLINE_S, is_on_mainline
 from coramp.vehicles.trace import (
     CHANGE_TOO_LATE,
     CHOSEN,
+    GAP_TOO_SMALL,
     HOLDS_UP_FURTHER_IN,
     LEAVES_LANE,
+    NO_GAP_FURTHER_IN,
     NOT_ON_MAINLINE,
+    SHIFT_TOO_FAR,
+    accept,
     note_moved,
     open_attempt,
     refuse,
     refuse_as_too_near,
 )
 from coramp.vehicles.traits import BRAKING, cruise_mps, pair_safety
+
+LEAST_WINDOW_S = 2.0
+"""Nobody moves to a gap further in who has less time for it."""
+SHIFTS_M = (4.0, -4.0, 8.0, -8.0, 12.0, -12.0, 16.0, -16.0, 20.0, -20.0, 25.0, -25.0, 30.0, -30.0)
+"""By how much a vehicle moves to a gap further in (positive: ahead), the least first."""
 
 
 class Asked(NamedTuple):
@@ -93,21 +104,23 @@ def make_way(
         row, front, rear, situation.from_s, situation.nose_s, situation.known_m, rest.clearance_m
     )
     way = np.empty((MAX_PIECES, 4))
-    n = way_further_in(fleet, proposal, asked, rules, way)
+    n, change_s, shift_m = way_further_in(fleet, proposal, asked, rules, way)
     if n == 0:
         return no_merge()
-    leaving = with_change(fleet, row, situation.from_s)
+    leaving = with_change(fleet, row, change_s)
     if free_alone:
         low_m, high_m = gap_bounds_m(fleet, rest, gap)
-        if not low_m <= rest.free_m <= high_m:
-            refuse_gap(fleet, proposal, rest, gap)
+        missing_m = max(low_m - rest.free_m, rest.free_m - high_m)
+        if missing_m > 0.0:
+            refuse(proposal.trace, GAP_TOO_SMALL, -1, missing_m)
             return no_merge()
         merge = merge_at(leaving, proposal, rest, gap, rest.free_m, False, rules)
     else:
         merge = reach_as(leaving, proposal, rest, gap, RUNG_MAKE_WAY, rules)
-    if merge.gap >= 0:
-        propose_change(fleet, proposal, row, way[:n])
-    return merge
+    if merge.gap < 0:
+        return merge
+    propose_change(fleet, proposal, row, way[:n], change_s)
+    return Merge(gap, merge.accel_mps2, merge.merge_time_s, merge.merge_station_m, abs(shift_m))
 
 
 @kernel
@@ -157,25 +170,79 @@ def plan_of_way(
 @kernel
 def way_further_in(
     fleet: Fleet, proposal: Proposal, asked: Asked, rules: Rules, out: FloatArray
-) -> int:
-    """Writes what a vehicle drives from when it changes lanes; returns 0 where it cannot.
+) -> tuple[int, float, float]:
+    """Writes what a vehicle drives that changes lanes; its length is 0 where it cannot.
 
-    That is what it has committed to, which nobody behind it notices. Where that is too slow or too
-    fast for the next lane, it goes back to its own cruise at once.
+    With it come when it begins to change (s), and by how much it moves for that (m, positive
+    ahead). It drives as it has committed to, which nobody behind it notices; where that is too slow
+    or too fast for the next lane, it goes back to its own cruise at once. Where there is no gap
+    beside it, it moves to one first, and changes as late as it can.
     """
-    open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, asked.front_row, asked.rear_row)
+    from_s, nothing = asked.from_s, (0, math.nan, 0.0)
+    _open(proposal, asked)
     if not _can_leave_in_time(fleet, proposal, asked):
-        return 0
-    n = clip_start(committed(fleet, asked.row), asked.from_s, out)
-    if has_room_further_in(fleet, proposal, asked, out[:n], rules):
-        return n
-    if n == 1:
-        return 0
+        return nothing
+    n = clip_start(committed(fleet, asked.row), from_s, out)
+    if has_room_further_in(fleet, proposal, asked, out[:n], from_s, rules):
+        return n, from_s, 0.0
+    if n > 1:
+        _open(proposal, asked)
+        n = _back_to_cruise(fleet, asked, rules, out)
+        if n > 0 and _fits(fleet, proposal, asked, out[:n], from_s, rules):
+            return n, from_s, 0.0
+    change_s = asked.nose_s - LANE_CHANGE_LASTS_S
+    if rules.traffic.differs or change_s < from_s + LEAST_WINDOW_S:
+        return nothing
+    _open(proposal, asked)
+    for shift_m in SHIFTS_M:
+        n = _moved(fleet, proposal, asked, change_s, shift_m, rules, out)
+        if n > 0 and _fits(fleet, proposal, asked, out[:n], change_s, rules):
+            accept(proposal.trace)
+            return n, change_s, shift_m
+    refuse(proposal.trace, NO_GAP_FURTHER_IN, asked.row, math.nan)
+    return nothing
+
+
+@kernel
+def _open(proposal: Proposal, asked: Asked) -> None:
     open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, asked.front_row, asked.rear_row)
-    n = _back_to_cruise(fleet, asked, rules, out)
-    if n == 0 or not has_room_further_in(fleet, proposal, asked, out[:n], rules):
+
+
+@kernel
+def _fits(
+    fleet: Fleet, proposal: Proposal, asked: Asked, way: FloatArray, change_s: float, rules: Rules
+) -> bool:
+    """Returns whether a vehicle that leaves what it has committed to keeps all its distances."""
+    room = has_room_further_in(fleet, proposal, asked, way, change_s, rules)
+    return room and _stays_clear_until_gone(fleet, proposal, asked, way, change_s, rules)
+
+
+@kernel
+def _moved(
+    fleet: Fleet,
+    proposal: Proposal,
+    asked: Asked,
+    change_s: float,
+    shift_m: float,
+    rules: Rules,
+    out: FloatArray,
+) -> int:
+    """Writes how a vehicle moves by ``shift_m`` until it changes lanes; 0 where it cannot.
+
+    By the speed triangle and within the bounds of rung create.
+    """
+    before, motion, v0 = committed(fleet, asked.row), rules.motion, rules.road.mainline_speed_mps
+    n = superpose_shift(before, asked.from_s, asked.from_s, change_s, shift_m, out)
+    if n == 0:
         return 0
-    return n if _stays_clear_until_gone(fleet, proposal, asked, out[:n], rules) else 0
+    lowest, highest = speed_range_mps(out[:n], asked.from_s)
+    too_fast = highest > (1.0 + motion.speed_deviation) * v0
+    too_slow = lowest < (1.0 - motion.slow_deviation) * v0
+    too_hard = largest_acceleration_mps2(out[:n], asked.from_s) > motion.comfort_mps2
+    if too_fast or too_slow or too_hard:
+        refuse(proposal.trace, SHIFT_TOO_FAR, asked.row, math.nan)
+        return 0
+    return n
 
 
 @kernel
@@ -207,19 +274,19 @@ def _back_to_cruise(fleet: Fleet, asked: Asked, rules: Rules, out: FloatArray) -
 
 @kernel
 def has_room_further_in(
-    fleet: Fleet, proposal: Proposal, asked: Asked, way: FloatArray, rules: Rules
+    fleet: Fleet, proposal: Proposal, asked: Asked, way: FloatArray, change_s: float, rules: Rules
 ) -> bool:
     """Returns whether a vehicle keeps its distance on the next lane from its change on, for ever.
 
     Nor may it hold up a vehicle that is yet to enter there, whose foremost intercept is
     ``known_m``: to that it leaves ``clearance_m``; one slower than v0, when it changes lanes.
     """
-    row, from_s, v0 = asked.row, asked.from_s, rules.road.mainline_speed_mps
+    row, v0 = asked.row, rules.road.mainline_speed_mps
     far_m = largest_safe_distance_m(rules)
-    lowest_m, highest_m = intercept_range_m(way, from_s, v0)
+    lowest_m, highest_m = intercept_range_m(way, change_s, v0)
     rear_m = lowest_m
     if math.isinf(rear_m):
-        rear_m = way[0, STATION] - v0 * from_s
+        rear_m = station_and_speed(way, change_s)[0] - v0 * change_s
     held_up_m = asked.known_m - (rear_m - fleet.length_m[row] - asked.clearance_m)
     if held_up_m > 0.0:
         refuse(proposal.trace, HOLDS_UP_FURTHER_IN, row, held_up_m)
@@ -236,7 +303,7 @@ def has_room_further_in(
             committed(fleet, other),
             fleet.traits[other],
             BY_MAINLINE_S,
-            from_s,
+            change_s,
             rules,
         )
         missing_m = rules.safety.execution_allowance_m - margin_m
@@ -248,11 +315,11 @@ def has_room_further_in(
 
 @kernel
 def _stays_clear_until_gone(
-    fleet: Fleet, proposal: Proposal, asked: Asked, way: FloatArray, rules: Rules
+    fleet: Fleet, proposal: Proposal, asked: Asked, way: FloatArray, change_s: float, rules: Rules
 ) -> bool:
     """Returns whether a vehicle keeps its distance on the lane that it leaves until it has."""
     row = asked.row
-    gone_s = asked.from_s + LANE_CHANGE_LASTS_S
+    gone_s = change_s + LANE_CHANGE_LASTS_S
     for other in fleet.live:
         merge_s = fleet.merge_time_s[other]
         start_s, end_s = max(asked.from_s, merge_s), min(gone_s, leaves_lane_s(fleet, other))
@@ -277,12 +344,14 @@ def _stays_clear_until_gone(
 
 
 @kernel
-def propose_change(fleet: Fleet, proposal: Proposal, row: int, way: FloatArray) -> None:
-    """Adds a vehicle that changes lanes as its way begins."""
+def propose_change(
+    fleet: Fleet, proposal: Proposal, row: int, way: FloatArray, change_s: float
+) -> None:
+    """Adds a vehicle that begins to change lanes then (s)."""
     entry = proposal.size[0]
     proposal.rows[entry], proposal.piece_count[entry] = row, len(way)
     proposal.pieces[entry, : len(way)] = way
     proposal.merge_time_s[entry] = fleet.merge_time_s[row]
-    proposal.lane_change_s[entry] = way[0, TIME]
+    proposal.lane_change_s[entry] = change_s
     proposal.size[0] = entry + 1
     note_moved(proposal.trace, row)

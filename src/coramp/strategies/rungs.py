@@ -150,6 +150,7 @@ def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rule
 
     ``reach_as`` says which one.
     """
+    open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
     return reach_as(fleet, proposal, situation, gap, RUNG_REACH, rules)
 
 
@@ -157,13 +158,12 @@ def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rule
 def reach_as(
     fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rung: int, rules: Rules
 ) -> Merge:
-    """Reaches a gap for any rung, by an acceleration of Eq. 22.
+    """Reaches a gap for any rung, by an acceleration of Eq. 22, in the attempt under way.
 
     The one nearest to free movement's, or with ``gap_at_front`` that of Eq. 30. Where a vehicle
     before it on the acceleration lane is in the way, others within the gap are tried.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
-    open_in_gap(proposal.trace, rung, 0, situation.order, gap)
     front_m = high_m
     low_m, high_m = max(low_m, situation.lowest_m), min(high_m, situation.highest_m)
     if low_m > high_m:

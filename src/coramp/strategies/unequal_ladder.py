@@ -171,17 +171,17 @@ def rung_make_way(
     clearance_m = merge_clearance_m(rules.road, pair_safety(traits, traits, rules.safety))
     asked = Asked(row, -1, -1, subject.from_s, nose_s, subject.known_m, clearance_m)
     way = np.empty((MAX_PIECES, 4))
-    n = way_further_in(fleet, proposal, asked, rules, way)
+    n, change_s, _ = way_further_in(fleet, proposal, asked, rules, way)
     if n == 0:
         return no_unequal_merge(), -1
-    leaving = with_change(fleet, row, subject.from_s)
+    leaving = with_change(fleet, row, change_s)
     for k in range(-1, 0 if free_alone else ACCELERATIONS):
         accel_mps2 = subject.free_mps2 if k < 0 else subject.tried_mps2[k]
         if k >= 0:
             open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, -1, -1)
         merge = _try_by(leaving, proposal, subject, subject.approach, accel_mps2, False, rules)
         if merge.done:
-            propose_change(fleet, proposal, row, way[:n])
+            propose_change(fleet, proposal, row, way[:n], change_s)
             return merge, row
     return no_unequal_merge(), -1
 

@@ -73,7 +73,8 @@ ROOM = 512
     NOT_ON_MAINLINE,
     CHANGE_TOO_LATE,
     HOLDS_UP_FURTHER_IN,
-) = range(25)
+    NO_GAP_FURTHER_IN,
+) = range(26)
 """Why an attempt failed; CHOSEN is the one that did not."""
 
 
