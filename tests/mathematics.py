@@ -199,13 +199,18 @@ def sized(length_m=5.0, safety=SAFETY, **own):
     return np.array(usual._replace(**own))
 
 
-def fleet_of(*vehicles, live=None, safety=SAFETY):
-    """Commitments of ``(pieces, merge time)``, 5 m long unless a length, or traits, follow."""
+def fleet_of(*vehicles, live=None, safety=SAFETY, lanes=None, changes_s=None):
+    """Commitments of ``(pieces, merge time)``, 5 m long unless a length, or traits, follow.
+
+    Of a mainline of several lanes: by which each came, and when it begins to change to the next.
+    """
     rows = [vehicle[0] for vehicle in vehicles]
     counts = [len(row) for row in rows]
     ranges = [intercept_range_m(row, row[0, 0], 20.0) for row in rows]
     told = [vehicle[2] if len(vehicle) > 2 else 5.0 for vehicle in vehicles]
     traits = np.array([sized(own, safety) if np.isscalar(own) else own for own in told])
+    lane = np.zeros(len(rows), np.int64) if lanes is None else np.array(lanes)
+    change_s = np.full(len(rows), math.inf) if changes_s is None else np.array(changes_s)
     return Fleet(
         pieces=np.concatenate(rows),
         first_piece=np.cumsum([0, *counts[:-1]]),
@@ -214,5 +219,8 @@ def fleet_of(*vehicles, live=None, safety=SAFETY):
         merge_time_s=np.array([vehicle[1] for vehicle in vehicles]),
         intercepts_m=np.array(ranges),
         traits=traits,
-        live=np.arange(len(rows)) if live is None else np.array(live),
+        live=np.flatnonzero(lane == 0) if live is None else np.array(live),
+        lane=lane,
+        change_s=change_s,
+        inner=np.flatnonzero((lane > 0) | np.isfinite(change_s)),
     )

@@ -65,7 +65,7 @@ def named(arrivals):
     for a in sorted(arrivals, key=lambda a: (a.step, a.on_ramp)):
         numbers[a.on_ramp] += 1
         name = f"{'r' if a.on_ramp else 'm'}{numbers[a.on_ramp]:05d}"
-        result.append(Arrival(name, a.on_ramp, a.step, a.speed_mps, a.length_m))
+        result.append(a._replace(vehicle_id=name))
     return result
 
 

@@ -56,6 +56,7 @@ class New(NamedTuple):
     pieces: np.ndarray
     merge_s: float
     makes_gap: int = 0
+    change_s: float = math.inf
 
 
 def traffic(*vehicles, live=None):
@@ -88,6 +89,7 @@ def verdict(*new, vehicles=ROAD, live=None, now_s=-math.inf, earliest_s=1.0, bou
         pieces=buffer,
         merge_s=np.array([one.merge_s for one in new]),
         makes_gap=np.array([one.makes_gap for one in new]),
+        lane_change_s=np.array([one.change_s for one in new]),
     )
     record = traffic(*vehicles, live=live)
     return examine(record, change, now_s, earliest_s, bounds)
@@ -135,8 +137,8 @@ def test_merge_with_a_gap_maker_is_accepted_with_its_least_margin():
 
 
 def test_every_reason_has_its_words():
-    assert len(REASONS) == 17
-    assert len(set(REASONS)) == 17
+    assert len(REASONS) == 18
+    assert len(set(REASONS)) == 18
 
 
 # form ---------------------------------------------------------------------------------------

@@ -92,6 +92,11 @@ ELSEWHERE = {
     t.TOO_MANY_MOVE,
     t.TOO_LATE,
     t.LEADER_WAITS,
+    t.LEAVES_LANE,
+    t.NOT_ON_MAINLINE,
+    t.CHANGE_TOO_LATE,
+    t.HOLDS_UP_FURTHER_IN,
+    t.NO_GAP_FURTHER_IN,
 }
 
 

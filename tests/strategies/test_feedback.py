@@ -40,7 +40,9 @@ def on_the_road(*vehicles):
     ledger, record = Ledger(), empty_record(16, 128)
     for stream, station_m, speed_mps in vehicles:
         pieces = np.array([[0.0, station_m, speed_mps, 0.0]])
-        commit_entry(ledger.book, record, sized(LENGTH_M), stream == "r", pieces, 0.0, 20.0, 400.0)
+        commit_entry(
+            ledger.book, record, sized(LENGTH_M), stream == "r", 0, pieces, 0.0, 20.0, 400.0
+        )
     return virtual_platoon(ledger.fleet, 0.0, packed(RULES))
 
 

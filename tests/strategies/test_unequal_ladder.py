@@ -78,6 +78,7 @@ def checked(found, rules=MIXED):
         proposal.pieces[:n],
         proposal.merge_time_s[:n],
         (np.arange(n) > 0).astype(np.int64),
+        proposal.lane_change_s[:n],
     )
     return examine(record, change, 0.0, rules.control.actuation_delay_s, bounds)
 

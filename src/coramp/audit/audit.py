@@ -55,6 +55,8 @@ FIGURES = (
     "plan_error_m",
 )
 """The figures of a run that are derived from its log and compared; collisions are judged apart."""
+OF_LANES = ("made_way",)
+"""Those of a mainline of several lanes."""
 COLLISIONS = "collisions"
 TOO_SELDOM = "drivers report once a second, and are under no commitment"
 
@@ -178,7 +180,9 @@ def _figures(inputs: Inputs, motion: Motion) -> list[Check]:
         checks += [unchecked(name, why) for name in others]
         return [*checks, unchecked("violations.parquet", why), _vehicles(inputs, passages)]
     checks = [_collisions(inputs, derived)]
-    checks += [_figure(inputs, name, figures[name]) for name in FIGURES]
+    checks += [
+        _figure(inputs, name, figures[name]) for name in (*FIGURES, *OF_LANES) if name in figures
+    ]
     return [*checks, _violations(inputs, derived), _vehicles(inputs, passages)]
 
 

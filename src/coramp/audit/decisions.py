@@ -15,10 +15,15 @@ from coramp.messages.kinds import ACKNOWLEDGEMENT, READING, SIGNAL
 from coramp.metrics.attempts import attempts_table
 from coramp.metrics.frames import decisions_table
 from coramp.strategies.base import period_of, steps_of_period
-from coramp.strategies.situation import RUNGS
+from coramp.strategies.situation import RUNGS, RUNGS_OF_ONE_LANE
 
 DECISION = "a decision"
-COUNTS = ("refused_plans", "interventions", "adjusted_vehicles", *(f"rung_{r}" for r in RUNGS))
+COUNTS = (
+    "refused_plans",
+    "interventions",
+    "adjusted_vehicles",
+    *(f"rung_{rung}" for rung in RUNGS_OF_ONE_LANE),
+)
 
 
 def check_requests(inputs: Inputs) -> Check:
@@ -93,6 +98,9 @@ def _changed(inputs: Inputs, due: Orders, until: int) -> list[Finding]:
         if not text and told.merge_s[k] != due.merge_s[k]:
             was, now = float(due.merge_s[k]), float(told.merge_s[k])
             text = f"merges at {now!r} s, decided is {was!r} s"
+        if not text and told.change_s[k] != due.change_s[k]:
+            was, now = float(due.change_s[k]), float(told.change_s[k])
+            text = f"changes lanes at {now!r} s, decided is {was!r} s"
         if text:
             found.append(finding(inputs.log, int(inputs.order_rows[k]), DECISION, text))
     return found
@@ -214,7 +222,7 @@ def check_records(inputs: Inputs, again: Replayed) -> list[Check]:
                 len(coordinator.refusals),
                 coordinator.interventions,
                 len(adjusted),
-                *map(len, served.values()),
+                *(len(served[rung]) for rung in RUNGS_OF_ONE_LANE),
             ),
             strict=True,
         )

@@ -54,7 +54,7 @@ def derive(
     gone_s = np.where(np.isnan(passages.entry_s), -math.inf, until_s)
     lanes = [
         extremes_in_lane(driven, askers.traits, stays, bounds)
-        for stays in _lanes(askers, passages, gone_s)
+        for stays in _lanes(askers, passages, gone_s, bounds)
     ]
     least = np.min([lane.extremes for lane in lanes], axis=0)
     most = np.max([lane.extremes for lane in lanes], axis=0)
@@ -82,6 +82,8 @@ def derive(
         "stops": float(_stops(driven.first, driven.rows, standing_until_s)),
     }
     violations = np.concatenate([lane.violations for lane in lanes])
+    if bounds.lanes > 1:
+        figures["made_way"] = float((passages.change_s < gone_s).sum())
     return Derived(figures, violations[np.argsort(violations[:, 0])], float(least[GAP]))
 
 
@@ -98,14 +100,31 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _lanes(askers: Askers, passages: Passages, gone_s: FloatArray) -> tuple[Stays, Stays]:
-    """Returns who used the mainline, and who the ramp with its acceleration lane."""
+def _lanes(
+    askers: Askers, passages: Passages, gone_s: FloatArray, bounds: Bounds
+) -> tuple[Stays, ...]:
+    """Returns who used each lane of the mainline, and who the ramp with its acceleration lane.
+
+    The mainline's begin with the one next to the ramp; who changes lanes is on both meanwhile.
+    """
     everyone = np.arange(len(gone_s))
     merged_s = np.where(np.isnan(passages.merge_s), NOT_COMMANDED, passages.merge_s)
     mainline_s = np.where(askers.on_ramp, merged_s, passages.entry_s)
     ramp_s = np.where(askers.on_ramp, passages.entry_s, np.nan)
+    leaves_s = np.minimum(gone_s, passages.change_s + bounds.lane_change_lasts_s)
+    lanes = []
+    for lane in range(bounds.lanes):
+        own, comes = askers.lane == lane, askers.lane + 1 == lane
+        lanes.append(
+            Stays(
+                np.concatenate([everyone[own], everyone[comes]]),
+                np.concatenate([mainline_s[own], passages.change_s[comes]]),
+                np.concatenate([leaves_s[own], gone_s[comes]]),
+                np.concatenate([askers.on_ramp[own], np.zeros(int(comes.sum()), np.bool_)]),
+            )
+        )
     return (
-        Stays(everyone, mainline_s, gone_s, askers.on_ramp),
+        *lanes,
         Stays(everyone, ramp_s, np.minimum(merged_s, gone_s), np.zeros(len(everyone), np.bool_)),
     )
 

@@ -79,6 +79,7 @@ def _askers(log: MessageLog, scenario: Scenario) -> Askers:
         asked["speed_mps"].to_numpy(),
         asked["length_m"].to_numpy(),
         np.column_stack([column.to_numpy() for column in traits]),
+        asked["lane"].fill_null(0).to_numpy(),
     )
 
 
@@ -93,6 +94,7 @@ def _orders(log: MessageLog, askers: Askers, rows: IntArray) -> Orders:
         told["time_s"].to_numpy(),
         (told["kind"] == ENTRY).to_numpy(),
         np.where(np.isnan(merge_s), none, merge_s),
+        told["lane_change_s"].fill_null(np.inf).to_numpy(),
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         log.pieces if len(rows) else log.pieces[:0],
     )
@@ -109,6 +111,7 @@ def orders_of(
         np.array([command.step * step_s for command in told], np.float64),
         np.array([isinstance(command, Enter) for command in told], np.bool_),
         np.array([command.merge_time_s for command in told], np.float64),
+        np.array([getattr(command, "lane_change_s", np.inf) for command in told], np.float64),
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         np.concatenate([np.empty((0, 4)), *(command.pieces for command in told)]),
     )

@@ -19,19 +19,22 @@ class Askers(NamedTuple):
     speed_mps: FloatArray
     length_m: FloatArray
     traits: FloatArray
+    lane: IntArray
 
 
 class Orders(NamedTuple):
     """All trajectories that were commanded, one entry each, in their order.
 
     Order k is ``pieces[first[k] : first[k + 1]]``. ``merge_s`` is as
-    ``checker.merging`` reads it.
+    ``checker.merging`` reads it. ``change_s`` is when it begins to change to the next lane of the
+    mainline, infinity where it tells of no change.
     """
 
     vehicle: IntArray
     time_s: FloatArray
     enters: BoolArray
     merge_s: FloatArray
+    change_s: FloatArray
     first: IntArray
     pieces: FloatArray
 
@@ -44,11 +47,15 @@ class Motion(NamedTuple):
 
 
 class Passages(NamedTuple):
-    """When each vehicle entered, came onto the mainline and left (s); nan for never."""
+    """When each vehicle entered, came onto the mainline and left (s); nan for never.
+
+    ``change_s`` is when it began to change to the next lane of the mainline, infinity for never.
+    """
 
     entry_s: FloatArray
     merge_s: FloatArray
     exit_s: FloatArray
+    change_s: FloatArray
 
 
 def motion_of(orders: Orders, vehicles: int) -> Motion:
@@ -97,7 +104,9 @@ def passages_of(
     entry_s[orders.vehicle[orders.enters]] = orders.time_s[orders.enters]
     exit_s = exits_s(motion.first, motion.rows, zone_end_m)
     exit_s[exit_s > end_s] = np.nan
-    return Passages(entry_s, merge_s, exit_s)
+    change_s = np.full(vehicles, np.inf)
+    np.minimum.at(change_s, orders.vehicle, orders.change_s)
+    return Passages(entry_s, merge_s, exit_s, change_s)
 
 
 @kernel

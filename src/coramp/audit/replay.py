@@ -37,6 +37,7 @@ def requests_in(log: MessageLog) -> list[RequestToEnter]:
             row["length_m"],
             row["vehicle_type"],
             _traits_in(row),
+            row["lane"] or 0,
         )
         for row, step in zip(asked, log.step[log.requests].tolist(), strict=True)
     ]

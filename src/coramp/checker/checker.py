@@ -25,6 +25,7 @@ from coramp.checker.pairs import (
 from coramp.checker.reasons import (
     ACCEPTED,
     BACKWARDS,
+    CHANGES_LANE_WRONGLY,
     CHANGES_THE_PAST,
     EXACT,
     HAS_A_JUMP,
@@ -40,13 +41,15 @@ from coramp.checker.reasons import (
     TOO_FAST,
     TOO_HARD,
 )
-from coramp.checker.record import LIVE, ROWS, Record, forget_exited, way_of
+from coramp.checker.record import CHANGE, LANE, LIVE, ROWS, Record, forget_exited, way_of
 
 
 class Change(NamedTuple):
     """New trajectories: entry k is for row ``rows[k]``, and is ``pieces[k, :piece_count[k]]``.
 
     ``makes_gap`` is 1 for vehicles that move aside, which may be faster than v0 until then.
+    ``lane_change_s`` is when a vehicle begins to change to the next lane further in, infinity where
+    the command tells of no change.
     """
 
     rows: IntArray
@@ -54,12 +57,13 @@ class Change(NamedTuple):
     pieces: FloatArray
     merge_s: FloatArray
     makes_gap: IntArray
+    lane_change_s: FloatArray
 
 
 class Entry(NamedTuple):
     """A vehicle's request to enter: when (s), where (m), how fast (m/s), what it can do, by where.
 
-    ``traits`` are columns of ``distances``.
+    ``traits`` are columns of ``distances``. ``lane`` is that of the mainline, 0 next to the ramp.
     """
 
     time_s: float
@@ -67,6 +71,7 @@ class Entry(NamedTuple):
     speed_mps: float
     traits: FloatArray
     on_ramp: bool
+    lane: float = 0.0
 
 
 class Verdict(NamedTuple):
@@ -130,7 +135,7 @@ def examine_entry(record: Record, entry: Entry, pieces: FloatArray, bounds: Boun
         code = _examine_accelerations(pieces, merge_s, entry.traits, bounds)
     if code != ACCEPTED:
         return Verdict(code, -1, -1, math.nan)
-    mine = way_with(pieces, merge_s, entry.traits)
+    mine = way_with(pieces, merge_s, entry.traits, entry.lane, math.inf)
     nobody = np.empty(0, np.int64)
     code, other, least = _examine_against_others(record, nobody, -1, mine, math.inf, bounds)
     return Verdict(code, -1, other, least)
@@ -160,7 +165,9 @@ def _examine_against_others(
 @kernel
 def _changed_way(record: Record, change: Change, k: int) -> Way:
     pieces = change.pieces[k, : change.piece_count[k]]
-    return way_with(pieces, change.merge_s[k], record.rows[change.rows[k]])
+    known = record.rows[change.rows[k]]
+    change_s = min(change.lane_change_s[k], known[CHANGE])
+    return way_with(pieces, change.merge_s[k], known, known[LANE], change_s)
 
 
 @kernel
@@ -189,6 +196,10 @@ def _examine_command(
         code = _examine_start(pieces, earliest_s, pieces[0, 0], station_m, speed_mps)
     if code == ACCEPTED and _changes_the_past(before.merge_s, merge_s, pieces[0, 0]):
         code = CHANGES_THE_PAST
+    if code == ACCEPTED:
+        known = record.rows[change.rows[k]]
+        change_s = change.lane_change_s[k]
+        code = _examine_lane_change(change_s, merge_s, earliest_s, known, bounds)
     if code == ACCEPTED:
         code = _examine_end(pieces, merge_s, bounds)
     if code == ACCEPTED:
@@ -242,6 +253,22 @@ def _changes_the_past(committed_s: float, merge_s: float, from_s: float) -> bool
     if merge_s == committed_s:
         return False
     return committed_s < from_s or merge_s < from_s
+
+
+@kernel
+def _examine_lane_change(
+    change_s: float, merge_s: float, earliest_s: float, known: FloatArray, bounds: Bounds
+) -> int:
+    """A vehicle changes lanes once, from when it can act on, to a lane that there is."""
+    if math.isnan(change_s):
+        return NOT_FINITE
+    if change_s == math.inf:
+        return ACCEPTED
+    is_first = known[CHANGE] == math.inf
+    is_later = earliest_s - JOIN <= change_s and merge_s <= change_s
+    if is_first and is_later and known[LANE] + 1.0 < bounds.lanes:
+        return ACCEPTED
+    return CHANGES_LANE_WRONGLY
 
 
 @kernel

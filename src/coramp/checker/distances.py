@@ -30,7 +30,11 @@ where only the common bounds hold.
 
 
 class Bounds(NamedTuple):
-    """What no plan may exceed; SI units, all positive but ``stop_station_m``."""
+    """What no plan may exceed; SI units, all positive but ``stop_station_m``.
+
+    ``lanes`` are those of the mainline. Who changes from one to the next counts on both for
+    ``lane_change_lasts_s``.
+    """
 
     zone_end_m: float
     stop_station_m: float
@@ -44,6 +48,8 @@ class Bounds(NamedTuple):
     comfort_mps2: float
     ramp_acceleration_mps2: float
     gap_speed_factor: float
+    lanes: int = 1
+    lane_change_lasts_s: float = math.inf
 
 
 class Needs(NamedTuple):

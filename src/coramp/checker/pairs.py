@@ -27,7 +27,9 @@ class Way(NamedTuple):
     """One vehicle's trajectory and merge time (``checker.merging``).
 
     With them come its length, its errors of Eq. 1 and its time gap as a follower: as numbers, since
-    kernels handle these faster than an array.
+    kernels handle these faster than an array. ``lane`` is that of the mainline by which it came, 0
+    next to the ramp, and ``change_s`` when it begins to change to the next one further in, infinity
+    for never.
     """
 
     pieces: FloatArray
@@ -36,10 +38,18 @@ class Way(NamedTuple):
     positioning_error_m: float
     clock_error_s: float
     time_gap_s: float
+    lane: float
+    change_s: float
 
 
 @kernel
-def way_with(pieces: FloatArray, merge_s: float, traits: FloatArray) -> Way:
+def way_with(
+    pieces: FloatArray,
+    merge_s: float,
+    traits: FloatArray,
+    lane: float = 0.0,
+    change_s: float = math.inf,
+) -> Way:
     """Returns the way of a vehicle with these traits (columns of ``distances``)."""
     return Way(
         pieces,
@@ -48,6 +58,8 @@ def way_with(pieces: FloatArray, merge_s: float, traits: FloatArray) -> Way:
         traits[POSITIONING],
         traits[CLOCK],
         traits[TIME_GAP],
+        lane,
+        change_s,
     )
 
 
@@ -68,7 +80,8 @@ def examine_pair(mine: Way, theirs: Way, from_s: float, bounds: Bounds) -> tuple
     """Returns a reason and the least margin (m) of two vehicles from ``from_s`` on.
 
     Eq. 1 while both are on the ramp or the acceleration lane, Eq. 15, 16 at the moment at which
-    the second of them comes onto the mainline, Eq. 1 from then on.
+    the second of them comes onto the mainline, Eq. 1 from then on. Where the mainline has several
+    lanes, while they share one.
     """
     least = math.inf
     ramp_until_s = min(mine.merge_s, theirs.merge_s)
@@ -79,6 +92,8 @@ def examine_pair(mine: Way, theirs: Way, from_s: float, bounds: Bounds) -> tuple
     mainline_from_s = max(mine.merge_s, theirs.merge_s)
     if not comes_onto_mainline(mainline_from_s):
         return ACCEPTED, least
+    if bounds.lanes > 1:
+        return _examine_in_lanes(mine, theirs, from_s, least, bounds)
     if mainline_from_s >= from_s:
         if mine.merge_s >= theirs.merge_s:
             at_merge = _margin_at_merge_m(mine, theirs, mainline_from_s, bounds)
@@ -92,6 +107,55 @@ def examine_pair(mine: Way, theirs: Way, from_s: float, bounds: Bounds) -> tuple
     if on_mainline < bounds.allowance_m - EXACT:
         return TOO_NEAR, on_mainline
     return ACCEPTED, min(least, on_mainline)
+
+
+@kernel
+def _examine_in_lanes(
+    mine: Way, theirs: Way, from_s: float, least: float, bounds: Bounds
+) -> tuple[int, float]:
+    """Returns a reason and the least margin (m) of two vehicles in each lane that they share.
+
+    Who merges comes onto lane 0, where Eq. 15 and 16 hold if the other is there at that moment.
+    """
+    for my_change in range(2):
+        my_lane, my_start_s, my_end_s = _stay(mine, my_change, bounds)
+        for their_change in range(2):
+            their_lane, their_start_s, their_end_s = _stay(theirs, their_change, bounds)
+            together_s, end_s = max(my_start_s, their_start_s), min(my_end_s, their_end_s)
+            if my_lane != their_lane or max(from_s, together_s) >= end_s:
+                continue
+            if together_s >= from_s and together_s == max(mine.merge_s, theirs.merge_s):
+                merging, other = (mine, theirs) if mine.merge_s == together_s else (theirs, mine)
+                at_merge = _margin_at_merge_m(merging, other, together_s, bounds)
+                if at_merge < bounds.allowance_m - EXACT:
+                    return TOO_NEAR_AT_MERGE, at_merge
+                least = min(least, at_merge)
+            margin = _least_of_pair_m(mine, theirs, max(from_s, together_s), end_s, bounds)
+            if margin < bounds.allowance_m - EXACT:
+                return TOO_NEAR, margin
+            least = min(least, margin)
+    return ACCEPTED, least
+
+
+@kernel
+def _stay(way: Way, after_change: int, bounds: Bounds) -> tuple[float, float, float]:
+    """Returns a lane of the mainline, from when and until when (s) a vehicle counts on it.
+
+    That is the lane by which it came, or the one to which it changes: it counts on both of them
+    while it changes. A stay that never is begins at infinity.
+    """
+    if after_change == 1:
+        return way.lane + 1.0, way.change_s, math.inf
+    return way.lane, way.merge_s, way.change_s + bounds.lane_change_lasts_s
+
+
+@kernel
+def never_share_a_lane(mine: Way, theirs: Way) -> bool:
+    """Returns whether two vehicles on the mainline keep to different lanes."""
+    if mine.lane == theirs.lane:
+        return False
+    further_in, outer = (mine, theirs) if mine.lane > theirs.lane else (theirs, mine)
+    return bool(further_in.lane != outer.lane + 1.0 or math.isinf(outer.change_s))
 
 
 @kernel
@@ -116,6 +180,8 @@ def surely_apart(
         return False
     start_s = max(from_s, mine.merge_s, theirs.merge_s)
     if not (comes_onto_mainline(mine.merge_s) and comes_onto_mainline(theirs.merge_s)):
+        return True
+    if bounds.lanes > 1 and never_share_a_lane(mine, theirs):
         return True
     envelope = envelope_of(theirs.pieces, start_s, bounds.mainline_speed_mps)
     if my_envelope.lowest_m >= envelope.highest_m:

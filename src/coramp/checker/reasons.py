@@ -18,7 +18,8 @@
     STARTS_TOO_LATE,
     HOLDS_NEWCOMERS,
     TAKES_NO_COMMANDS,
-) = range(17)
+    CHANGES_LANE_WRONGLY,
+) = range(18)
 
 REASONS = (
     "accepted",
@@ -38,6 +39,7 @@ REASONS = (
     "starts later than the vehicle can act: what it drives until then is missing",
     "may hold up a mainline vehicle that is yet to enter, which its strategy does not declare",
     "commands a vehicle that takes no commands: a driver, or one that never entered",
+    "changes lanes twice, before it can, before it is on the mainline, or to a lane there is not",
 )
 
 JOIN = 1e-6

@@ -16,7 +16,7 @@ from coramp.checker.pairs import Way
 
 FIRST, COUNT = range(2)
 """Columns of ``Record.places``."""
-MERGE, EXIT = TRAITS, TRAITS + 1
+MERGE, EXIT, LANE, CHANGE = range(TRAITS, TRAITS + 4)
 """Columns of ``Record.rows`` behind those of what a vehicle can do."""
 ROWS, PIECES, LIVE, LONGEST = range(4)
 """Places in ``Record.used``; the last is the largest number of pieces that a row has had."""
@@ -28,7 +28,9 @@ class Record(NamedTuple):
     Row i drives ``pieces[first : first + count]`` with (first, count) = ``places[i]``. What it can
     do is ``rows[i, :TRAITS]`` (columns of ``distances``). It comes onto the mainline at
     ``rows[i, MERGE]`` (``checker.merging``) and leaves the zone at ``rows[i, EXIT]`` (s; infinity
-    while it would stop before). ``live`` lists the rows on the road, by entry.
+    while it would stop before). It came by the mainline's lane ``rows[i, LANE]``, and begins to
+    change to the next one at ``rows[i, CHANGE]`` (s; infinity for never). ``live`` lists the rows
+    on the road, by entry.
     """
 
     pieces: FloatArray
@@ -43,7 +45,7 @@ def empty_record(rows: int, pieces: int) -> Record:
     return Record(
         np.empty((pieces, 4)),
         np.zeros((rows, 2), np.int64),
-        np.full((rows, TRAITS + 2), math.inf),
+        np.full((rows, TRAITS + 4), math.inf),
         np.zeros(rows, np.int64),
         np.zeros(4, np.int64),
     )
@@ -115,16 +117,24 @@ def way_of(record: Record, row: int) -> Way:
         record.rows[row, POSITIONING],
         record.rows[row, CLOCK],
         record.rows[row, TIME_GAP],
+        record.rows[row, LANE],
+        record.rows[row, CHANGE],
     )
 
 
 @kernel
 def note_entry(
-    record: Record, traits: FloatArray, merge_s: float, pieces: FloatArray, zone_end_m: float
+    record: Record,
+    traits: FloatArray,
+    merge_s: float,
+    pieces: FloatArray,
+    zone_end_m: float,
+    lane: float = 0.0,
 ) -> int:
-    """Notes a vehicle that enters on ``pieces``; returns its row."""
+    """Notes a vehicle that enters on ``pieces``, in a lane of the mainline; returns its row."""
     row = record.used[ROWS]
     record.rows[row, :TRAITS] = traits
+    record.rows[row, LANE] = lane
     _write(record, row, record.used[PIECES], pieces, merge_s, zone_end_m)
     record.live[record.used[LIVE]] = row
     record.used[LIVE] += 1
@@ -134,12 +144,20 @@ def note_entry(
 
 @kernel
 def note_command(
-    record: Record, row: int, merge_s: float, pieces: FloatArray, now_s: float, zone_end_m: float
+    record: Record,
+    row: int,
+    merge_s: float,
+    pieces: FloatArray,
+    now_s: float,
+    zone_end_m: float,
+    change_s: float = math.inf,
 ) -> None:
     """Notes at ``now_s`` that a row follows ``pieces`` from their first time on.
 
-    Until then it drives what it was told before, which is kept in front of them.
+    Until then it drives what it was told before, which is kept in front of them. A command that
+    tells of no change of lanes leaves it to an earlier one.
     """
+    record.rows[row, CHANGE] = min(record.rows[row, CHANGE], change_s)
     start = record.used[PIECES]
     first, count = record.places[row, FIRST], record.places[row, COUNT]
     kept = 0

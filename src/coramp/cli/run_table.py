@@ -111,7 +111,10 @@ def _plan_lines(figures: _Figures) -> Iterator[tuple[str, str]]:
     yield figures.alike("plan_error_m")
     yield figures.alike("interventions")
     if any(summary[column] for column in RUNG_COLUMNS.values()):
-        by_rung = ", ".join(f"{rung} {summary[c]}" for rung, c in RUNG_COLUMNS.items())
+        counts = {rung: summary[column] for rung, column in RUNG_COLUMNS.items()}
+        if summary.get("made_way") is not None:
+            counts["make way"] = summary["made_way"]
+        by_rung = ", ".join(f"{rung} {count}" for rung, count in counts.items())
         yield "ramp vehicles by rung", by_rung
         yield figures.alike("adjusted_vehicles")
 

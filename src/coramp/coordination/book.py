@@ -18,12 +18,13 @@ from coramp.kinematics.trajectory import (
     station_and_speed,
     time_at_station,
 )
+from coramp.road.lanes import LANE_CHANGE_LASTS_S
 from coramp.vehicles.fleet import Fleet, committed
 from coramp.vehicles.merge_state import NOT_PLANNED_S, has_place_on_mainline
 from coramp.vehicles.traits import Traits
 
-ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES = range(5)
-"""Places in ``Book.used``; the last is the largest ``way_count`` that there has been."""
+ROWS, PIECES, LIVE, BLOCKS, MOST_PIECES, INNER = range(6)
+"""Places in ``Book.used``; the last but one is the largest ``way_count`` that there has been."""
 LONG = 500_000
 """From so many pieces on (16 MB) a book is made to forget what was never driven."""
 
@@ -35,7 +36,7 @@ class Book(NamedTuple):
     drives from its last decision on: before the pieces of its last commitment come those of earlier
     ones that it drives until that takes over, which is later by the actuation delay. ``exit_s`` is
     when a row's front leaves the zone, infinity while it would stop before. Block b is a commitment
-    of ``block_row[b]``.
+    of ``block_row[b]``. ``lane``, ``change_s`` and ``inner`` are those of ``Fleet``, too.
     """
 
     pieces: FloatArray
@@ -52,6 +53,9 @@ class Book(NamedTuple):
     block_row: IntArray
     block_first: IntArray
     block_count: IntArray
+    lane: IntArray
+    change_s: FloatArray
+    inner: IntArray
     used: IntArray
 
 
@@ -72,7 +76,10 @@ def empty_book(rows: int, blocks: int, pieces: int) -> Book:
         np.zeros(blocks, np.int64),
         np.zeros(blocks, np.int64),
         np.zeros(blocks, np.int64),
-        np.zeros(5, np.int64),
+        np.zeros(rows, np.int64),
+        np.full(rows, math.inf),
+        np.zeros(rows, np.int64),
+        np.zeros(6, np.int64),
     )
 
 
@@ -180,6 +187,9 @@ def _as_fleet(book: Book, first_piece: IntArray, piece_count: IntArray) -> Fleet
         book.intercepts_m,
         book.traits,
         book.live[: book.used[LIVE]],
+        book.lane,
+        book.change_s,
+        book.inner[: book.used[INNER]],
     )
 
 
@@ -216,9 +226,18 @@ def write_commitment(
     book.used[BLOCKS] += 1
     book.used[PIECES] += lead + count
     book.used[MOST_PIECES] = max(book.used[MOST_PIECES], lead + count)
-    if entering:
+    if entering and book.lane[row] > 0:
+        note_inner(book, row)
+    elif entering:
         book.live[book.used[LIVE]] = row
         book.used[LIVE] += 1
+
+
+@kernel
+def note_inner(book: Book, row: int) -> None:
+    """Puts a vehicle on the list of those that are on the lanes further in."""
+    book.inner[book.used[INNER]] = row
+    book.used[INNER] += 1
 
 
 @kernel
@@ -238,13 +257,20 @@ def _write_lead_in(book: Book, row: int, now_s: float, until_s: float) -> int:
 
 @kernel
 def strike_exited(book: Book, time_s: float) -> None:
-    """Takes vehicles off the live list that have left the zone by ``time_s``."""
+    """Takes vehicles off the lists that have left the zone, or the lane, by ``time_s``."""
     kept = 0
     for k in range(book.used[LIVE]):
-        if book.exit_s[book.live[k]] > time_s:
-            book.live[kept] = book.live[k]
+        row = book.live[k]
+        if book.exit_s[row] > time_s and book.change_s[row] + LANE_CHANGE_LASTS_S > time_s:
+            book.live[kept] = row
             kept += 1
     book.used[LIVE] = kept
+    kept = 0
+    for k in range(book.used[INNER]):
+        if book.exit_s[book.inner[k]] > time_s:
+            book.inner[kept] = book.inner[k]
+            kept += 1
+    book.used[INNER] = kept
 
 
 @kernel

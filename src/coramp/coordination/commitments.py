@@ -4,9 +4,11 @@ Whatever is commanded goes into both, or the checker would examine against what 
 Kernels write where there is room; ``Commitments`` makes it.
 """
 
+import math
+
 from coramp._kernel import FloatArray, kernel
 from coramp.checker.record import Record, has_room, note_command, note_entry
-from coramp.coordination.book import ROWS, Book, is_full, write_commitment
+from coramp.coordination.book import ROWS, Book, is_full, note_inner, write_commitment
 from coramp.coordination.examination import Examiner
 from coramp.coordination.ledger import Ledger
 from coramp.kinematics.trajectory import MAX_PIECES
@@ -29,7 +31,14 @@ class Commitments:
         self.ledger.make_room(commitments)
         self.examiner.make_room(commitments)
 
-    def change(self, row: int, pieces: FloatArray, merge_s: float, now_s: float) -> None:
+    def change(
+        self,
+        row: int,
+        pieces: FloatArray,
+        merge_s: float,
+        now_s: float,
+        lane_change_s: float = math.inf,
+    ) -> None:
         """Commits ``row`` at ``now_s`` to ``pieces``, from their first time on."""
         self.make_room()
         commit_change(
@@ -41,6 +50,7 @@ class Commitments:
             now_s,
             self._cruise_mps,
             self._zone_end_m,
+            lane_change_s,
         )
 
 
@@ -50,12 +60,13 @@ def commit_entry(
     record: Record,
     traits: FloatArray,
     on_ramp: bool,
+    lane: int,
     pieces: FloatArray,
     now_s: float,
     cruise_mps: float,
     zone_end_m: float,
 ) -> int:
-    """Commits a vehicle that enters at ``now_s`` to ``pieces``; returns its row.
+    """Commits a vehicle that enters a lane at ``now_s`` to ``pieces``; returns its row.
 
     Where there is no room for it, it changes nothing and returns ``NO_ROOM``.
     """
@@ -63,7 +74,8 @@ def commit_entry(
     if full or not has_room(record, MAX_PIECES):
         return NO_ROOM
     merge_s, row = merge_time_at_entry_s(on_ramp), book.used[ROWS]
-    note_entry(record, traits, merge_s, pieces, zone_end_m)
+    note_entry(record, traits, merge_s, pieces, zone_end_m, float(lane))
+    book.lane[row] = lane
     book.length_m[row] = traits[LENGTH]
     book.traits[row] = traits
     book.used[ROWS] += 1
@@ -81,7 +93,14 @@ def commit_change(
     now_s: float,
     cruise_mps: float,
     zone_end_m: float,
+    lane_change_s: float = math.inf,
 ) -> None:
-    """Commits a vehicle on the road at ``now_s`` to ``pieces``, from their first time on."""
-    note_command(record, row, merge_s, pieces, now_s, zone_end_m)
+    """Commits a vehicle on the road at ``now_s`` to ``pieces``, from their first time on.
+
+    It begins to change to the next lane further in at ``lane_change_s``, if that is a time.
+    """
+    note_command(record, row, merge_s, pieces, now_s, zone_end_m, lane_change_s)
+    if lane_change_s < math.inf:
+        book.change_s[row] = lane_change_s
+        note_inner(book, row)
     write_commitment(book, row, pieces, merge_s, now_s, cruise_mps, zone_end_m)

@@ -179,11 +179,13 @@ class Coordinator:
         if stop_starts_s(self.ledger.trajectory(row)) <= before_step * self._step_s:
             self._moves_up(row, step)
 
-    def _commit(self, row: int, pieces: FloatArray, merge_time_s: float, step: int) -> None:
-        self._commitments.change(row, pieces, merge_time_s, step * self._step_s)
+    def _commit(self, command: FollowTrajectory, step: int) -> None:
+        row, merge_time_s = command.row, command.merge_time_s
+        now_s, lane_change_s = step * self._step_s, command.lane_change_s
+        self._commitments.change(row, command.pieces, merge_time_s, now_s, lane_change_s)
         if has_place_on_mainline(merge_time_s):
             self._wakes.planned(row)  # nothing is due any more at its decision station
-        self._announce(row, step)
+        self._announce(row, step, lane_change_s)
 
     def _plan_when_due(self, row: int, pieces: FloatArray, step: int) -> None:
         due_s = decision_due_s(pieces, self._rules.road.decision_station_m)
@@ -217,7 +219,7 @@ class Coordinator:
             self._log.note_refused_entry(row, verdict.code, time_s)
             return False
         for move in moves:
-            self._commit(move.row, move.pieces, move.merge_time_s, step)
+            self._commit(move, step)
         return True
 
     def view(self, subjects: tuple[int, ...], step: int) -> View:
@@ -258,7 +260,7 @@ class Coordinator:
                 return
             margin_m = verdict.least_margin_m
             for command in trajectories:
-                self._commit(command.row, command.pieces, command.merge_time_s, step)
+                self._commit(command, step)
         self._memory = decision.memory
         self._told_of_entries = len(self.ledger)
         self._log.note_decision(decision, trajectories, time_s, margin_m)
@@ -304,11 +306,11 @@ class Coordinator:
         self.interventions += refused
         return refused
 
-    def _announce(self, row: int, step: int) -> None:
+    def _announce(self, row: int, step: int, lane_change_s: float = math.inf) -> None:
         """Tells who carries the vehicle, and when it is planned, of its new commitment."""
         pieces = self.ledger.trajectory(row)
         if self._plant is not None:
-            self._plant.follow(row, pieces, self.ledger.merge_time_s(row))
+            self._plant.follow(row, pieces, self.ledger.merge_time_s(row), lane_change_s)
         if self._wakes.is_due(row):
             self._plan_when_due(row, pieces, step)
 

@@ -27,12 +27,16 @@ def driven_pieces(
     """Returns first rows (one a vehicle and one more), codes of lanes and pieces, up to ``end_s``.
 
     Each commitment counts until the next one of its vehicle takes over, the last one until the
-    vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose and at the merge.
+    vehicle leaves the zone. A piece lies on one lane: pieces are cut at the nose, at the merge, and
+    where a vehicle begins to change to the next lane of the mainline.
     """
     book, blocks = ledger.book, ledger.book.used[BLOCKS]
     merge_s, until_s = np.full(vehicles, NOT_PLANNED_S), np.full(vehicles, end_s)
+    came_by, change_s = np.zeros(vehicles, np.int64), np.full(vehicles, np.inf)
     merge_s[vehicle_of_row] = book.merge_time_s[: len(ledger)]
     until_s[vehicle_of_row] = np.minimum(end_s, book.exit_s[: len(ledger)])
+    came_by[vehicle_of_row] = book.lane[: len(ledger)]
+    change_s[vehicle_of_row] = book.change_s[: len(ledger)]
     of_block = vehicle_of_row[book.block_row[:blocks]]
     by_vehicle = np.argsort(of_block, kind="stable")
     return _stitched(
@@ -42,6 +46,8 @@ def driven_pieces(
         book.block_count[by_vehicle],
         merge_s,
         until_s,
+        came_by,
+        change_s,
     )
 
 
@@ -53,9 +59,11 @@ def _stitched(
     block_count: IntArray,
     merge_s: FloatArray,
     until_s: FloatArray,
+    came_by: IntArray,
+    change_s: FloatArray,
 ) -> tuple[IntArray, IntArray, FloatArray]:
     vehicles = len(until_s)
-    capacity = 3 * np.sum(block_count) + 8
+    capacity = 3 * np.sum(block_count) + vehicles + 8
     first = np.zeros(vehicles + 1, np.int64)
     lane = np.empty(capacity, np.int64)
     rows = np.empty((capacity, 4))
@@ -70,7 +78,8 @@ def _stitched(
             start_s = pieces[k, TIME]
             end_s = min(piece_end_s(pieces, k), block_end_s)
             while start_s < end_s - SLIVER_S:
-                n, start_s = _cut(pieces, k, start_s, end_s, merge_s[vehicle], lane, rows, n)
+                stay = merge_s[vehicle], came_by[vehicle], change_s[vehicle]
+                n, start_s = _cut(pieces, k, start_s, end_s, stay, lane, rows, n)
         first[vehicle + 1] = n
     for vehicle in range(vehicles):
         first[vehicle + 1] = max(first[vehicle], first[vehicle + 1])
@@ -83,14 +92,20 @@ def _cut(
     k: int,
     start_s: float,
     end_s: float,
-    merge_s: float,
+    stay: tuple[float, int, float],
     lane: IntArray,
     rows: FloatArray,
     n: int,
 ) -> tuple[int, float]:
+    """Writes a piece on one lane; ``stay``: when it merges, its lane, when it changes that."""
+    merge_s, came_by, change_s = stay
     station_m, speed_mps = station_and_speed(pieces[: k + 1], start_s)
     if start_s >= merge_s - 1e-9:
-        code = MAINLINE
+        code = MAINLINE + came_by
+        if start_s >= change_s - 1e-9:
+            code += 1
+        else:
+            end_s = min(end_s, change_s)
     elif station_m < -1e-9:
         code = RAMP
         end_s = min(end_s, start_s + time_to_cover(-station_m, speed_mps, pieces[k, ACCEL]))

@@ -55,7 +55,7 @@ class Entrance:
         listeners: Listeners,
     ) -> None:
         slowest_mps = policy.slowest_share * rules.road.mainline_speed_mps
-        self._gate = gate_for(feed, policy.asked, slowest_mps)
+        self._gate = gate_for(feed, policy.asked, slowest_mps, rules.road.lanes)
         self._feed, self._asks = feed, policy.asked
         self._rules, self._packed = rules, packed(rules)
         self._step_s = rules.control.step_s
@@ -99,6 +99,8 @@ class Entrance:
         self._tell_plant(new)
         if self._asks:
             for row in range(new.start, new.stop):
+                if self._ledger.lane(row) > 0:
+                    continue
                 step = int(self._gate.row_step[row])
                 self._wakes.ask(step, row)
                 first_due = min(first_due, step)

@@ -1,5 +1,6 @@
 """Hands proposed commitments to the independent checker."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ from coramp.checker.checker import Change, Verdict, examine
 from coramp.checker.distances import Bounds
 from coramp.checker.record import Record, empty_record, with_room
 from coramp.kinematics.trajectory import MAX_PIECES
+from coramp.road.lanes import LANE_CHANGE_LASTS_S
 from coramp.road.rules import Rules
 from coramp.strategies.base import FollowTrajectory
 from coramp.vehicles.fleet import MAX_CHANGED
@@ -30,6 +32,8 @@ def bounds_of(rules: Rules) -> Bounds:
         comfort_mps2=motion.comfort_mps2,
         ramp_acceleration_mps2=motion.ramp_acceleration_mps2,
         gap_speed_factor=1.0 + motion.speed_deviation,
+        lanes=road.lanes,
+        lane_change_lasts_s=LANE_CHANGE_LASTS_S,
     )
 
 
@@ -56,6 +60,7 @@ class Examiner:
             np.zeros((changes, MAX_PIECES, 4)),
             np.zeros(changes),
             np.zeros(changes, np.int64),
+            np.full(changes, math.inf),
         )
 
     def change(
@@ -72,6 +77,7 @@ class Examiner:
             change.pieces[k, :count] = command.pieces
             change.merge_s[k] = command.merge_time_s
             change.makes_gap[k] = command.makes_gap
+            change.lane_change_s[k] = command.lane_change_s
         return examine_first(self.record, change, len(commands), now_s, earliest_s, self.bounds)
 
 
@@ -86,5 +92,6 @@ def examine_first(
         change.pieces[:count],
         change.merge_s[:count],
         change.makes_gap[:count],
+        change.lane_change_s[:count],
     )
     return examine(record, in_use, now_s, earliest_s, bounds)

@@ -15,6 +15,7 @@ from coramp.checker.record import Record
 from coramp.coordination.admission import decision_due_s, plan_entry
 from coramp.coordination.book import (
     BLOCKS,
+    INNER,
     LIVE,
     ROWS,
     Book,
@@ -26,10 +27,13 @@ from coramp.messages.feed import RequestFeed
 from coramp.motion.clock import first_step_from
 from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Entered, Waiting
+from coramp.vehicles.fleet import in_lane
 from coramp.vehicles.traits import LENGTH, traits_or_usual
 
 NEVER = 1 << 60
 WAITS, CROWDED = -1, -2
+OUTERMOST, RAMP, SECOND = range(3)
+"""Streams of the gate: the mainline's outermost lane, the ramp, and the lanes further in."""
 HEARD, OFFERED, OPEN = range(3)
 """Places in ``Gate.feed``."""
 DONE, FULL, REFUSED = range(3)
@@ -39,9 +43,9 @@ ARRIVAL, CODE, COMMITMENTS, ON_ROAD = range(4)
 
 
 class Gate(NamedTuple):
-    """Requests to enter, who is next on each stream (0 mainline, 1 ramp), and who entered when.
+    """Requests to enter, who is next on each stream, and who entered when.
 
-    The first four fields are those of the world's feed. A request is read, and counted in
+    The first five fields are those of the world's feed. A request is read, and counted in
     ``feed[HEARD]``, only when its step has come.
 
     - ``of_stream[s]``: the ``vehicles[s]`` requests of stream s that have been heard.
@@ -60,6 +64,7 @@ class Gate(NamedTuple):
     on_ramp: BoolArray
     speed_mps: FloatArray
     traits: FloatArray
+    lane: IntArray
     of_stream: IntArray
     vehicles: IntArray
     next_place: IntArray
@@ -82,22 +87,24 @@ class Stop(NamedTuple):
     code: int
 
 
-def gate_for(feed: RequestFeed, asks: bool = False, slowest_mps: float = 0.0) -> Gate:
+def gate_for(
+    feed: RequestFeed, asks: bool = False, slowest_mps: float = 0.0, lanes: int = 1
+) -> Gate:
     """Returns the gate before anyone has entered; nobody tries until ``open_gate``."""
-    room = len(feed.arrays.step)
+    room, streams = len(feed.arrays.step), lanes + 1
     return Gate(
         *feed.arrays,
-        np.zeros((2, room), np.int64),
-        np.zeros(2, np.int64),
-        np.zeros(2, np.int64),
-        np.full(2, NEVER),
+        np.zeros((streams, room), np.int64),
+        np.zeros(streams, np.int64),
+        np.zeros(streams, np.int64),
+        np.full(streams, NEVER),
         np.zeros(room, np.int64),
         np.zeros(room, np.int64),
         np.full(room, NEVER),
         np.array([asks]),
         np.array([slowest_mps]),
         np.array([0, len(feed), 0], np.int64),
-        np.full((2, 4), -1),
+        np.full((streams, 4), -1),
     )
 
 
@@ -107,7 +114,7 @@ def with_feed(gate: Gate, feed: RequestFeed) -> Gate:
     old, room = gate.of_stream.shape[1], len(feed.arrays.step)
     if room == old:
         return gate
-    of_stream = np.zeros((2, room), np.int64)
+    of_stream = np.zeros((len(gate.vehicles), room), np.int64)
     of_stream[:, :old] = gate.of_stream
     more = room - old
     return gate._replace(
@@ -120,17 +127,19 @@ def with_feed(gate: Gate, feed: RequestFeed) -> Gate:
 
 
 def entries_of(gate: Gate, rows: range, step_s: float) -> tuple[Entered, ...]:
-    """Returns the entries of these rows of the book."""
+    """Returns the entries of these rows of the book, but for those on lanes further in."""
     entries = []
     for row in rows:
         k = gate.row_arrival[row]
+        if gate.lane[k] > 0:
+            continue
         entered_s, since_s = float(gate.row_step[row] * step_s), float(gate.step[k] * step_s)
         entries.append(Entered(row, bool(gate.on_ramp[k]), entered_s, since_s))
     return tuple(entries)
 
 
 def waiting_at(gate: Gate, step: int, step_s: float) -> Waiting:
-    """Returns who has come by ``step`` and not entered."""
+    """Returns who has come by ``step`` and not entered, but for those on lanes further in."""
     return Waiting(*_waiting_at(gate, step, step_s))
 
 
@@ -167,7 +176,7 @@ def open_gate(gate: Gate) -> None:
 @kernel
 def next_step(gate: Gate) -> int:
     """Returns when somebody tries to enter, or the next request is due."""
-    step = min(gate.try_step[0], gate.try_step[1])
+    step = np.min(gate.try_step)
     heard = gate.feed[HEARD]
     if gate.feed[OPEN] == 1 and heard < gate.feed[OFFERED]:
         step = min(step, gate.step[heard])
@@ -179,7 +188,9 @@ def _hear(gate: Gate, step: int) -> None:
     """Reads the requests that are due by ``step``."""
     while gate.feed[HEARD] < gate.feed[OFFERED] and gate.step[gate.feed[HEARD]] <= step:
         request = gate.feed[HEARD]
-        stream = 1 if gate.on_ramp[request] else 0
+        stream = RAMP if gate.on_ramp[request] else OUTERMOST
+        if gate.lane[request] > 0:
+            stream = SECOND + gate.lane[request] - 1
         place = gate.vehicles[stream]
         gate.of_stream[stream, place] = request
         gate.vehicles[stream] += 1
@@ -219,13 +230,13 @@ def admit_until(
         if step > last_step:
             return Stop(DONE, step, -1, ACCEPTED)
         _hear(gate, step)
-        for stream in range(2):
+        for stream in range(len(gate.vehicles)):
             while gate.try_step[stream] <= step:
                 arrival = gate.of_stream[stream, gate.next_place[stream]]
                 if _is_as_refused(book, gate, stream, arrival):
                     gate.try_step[stream] = step + 1
                     continue
-                start_m = rules.road.ramp_start_m if stream == 1 else rules.road.mainline_start_m
+                start_m = start_of_m(stream, rules)
                 code = enter(book, record, gate, arrival, start_m, step, rules, bounds)
                 if code == CROWDED:
                     return Stop(FULL, step, -1, ACCEPTED)
@@ -233,12 +244,18 @@ def admit_until(
                     gate.next_place[stream] += 1
                     _next_tries(gate, stream, step)
                     last_step = min(last_step, gate.row_due_step[book.used[ROWS] - 1])
-                    if gate.asks[0]:
+                    if gate.asks[0] and stream < SECOND:
                         last_step = min(last_step, step)
                 else:
                     gate.try_step[stream] = step + 1
                     if code != WAITS and _is_news(book, gate, stream, arrival, code):
                         return Stop(REFUSED, step, arrival, code)
+
+
+@kernel
+def start_of_m(stream: int, rules: Rules) -> float:
+    """Returns the station (m) at which a stream enters."""
+    return rules.road.ramp_start_m if stream == RAMP else rules.road.mainline_start_m
 
 
 @kernel
@@ -249,7 +266,7 @@ def _is_as_refused(book: Book, gate: Gate, stream: int, arrival: int) -> bool:
         last[ARRIVAL] == arrival
         and last[CODE] not in (TOO_NEAR, TOO_NEAR_AT_MERGE)
         and last[COMMITMENTS] == book.used[BLOCKS]
-        and last[ON_ROAD] == book.used[LIVE]
+        and last[ON_ROAD] == book.used[LIVE] + book.used[INNER]
     )
 
 
@@ -259,7 +276,8 @@ def _is_news(book: Book, gate: Gate, stream: int, arrival: int, code: int) -> bo
     last = gate.refused[stream]
     news = last[ARRIVAL] != arrival or last[CODE] != code
     last[ARRIVAL], last[CODE] = arrival, code
-    last[COMMITMENTS], last[ON_ROAD] = book.used[BLOCKS], book.used[LIVE]
+    on_road = book.used[LIVE] + book.used[INNER]
+    last[COMMITMENTS], last[ON_ROAD] = book.used[BLOCKS], on_road
     return bool(news)
 
 
@@ -281,8 +299,12 @@ def enter(
     """
     time_s, on_ramp = step * rules.control.step_s, bool(gate.on_ramp[arrival])
     traits, speed_mps = traits_or_usual(gate.traits[arrival], rules), gate.speed_mps[arrival]
+    lane = gate.lane[arrival]
+    others = ways_of(book)
+    if lane > 0:
+        others = in_lane(others, lane)
     pieces = plan_entry(
-        ways_of(book),
+        others,
         traits,
         on_ramp,
         time_s,
@@ -293,7 +315,7 @@ def enter(
     )
     if len(pieces) == 0:
         return WAITS
-    entry = Entry(time_s, station_m, speed_mps, traits, on_ramp)
+    entry = Entry(time_s, station_m, speed_mps, traits, on_ramp, float(lane))
     code = examine_entry(record, entry, pieces, bounds).code
     if code != ACCEPTED:
         return code
@@ -303,6 +325,7 @@ def enter(
         record,
         traits,
         on_ramp,
+        lane,
         pieces,
         time_s,
         road.mainline_speed_mps,

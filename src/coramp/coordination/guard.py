@@ -165,7 +165,7 @@ def _wrong_with(decision: Any, view: View) -> str:
 
 
 def _wrong_inside(decision: Decision, view: View) -> str:
-    live = set(view.fleet.live.tolist())
+    live = {*view.fleet.live.tolist(), *view.fleet.inner.tolist()}
     moved = [command for command in decision.commands if isinstance(command, FollowTrajectory)]
     if len(moved) > MAX_CHANGED:
         return f"commands {len(moved)} trajectories; allowed are {MAX_CHANGED} at a time"

@@ -8,6 +8,7 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.coordination.book import (
     BLOCKS,
+    INNER,
     LIVE,
     ROWS,
     Book,
@@ -44,7 +45,8 @@ class Ledger:
     def fleet(self) -> Fleet:
         """All commitments as planners read them."""
         book = self.book
-        return Fleet(*book[:7], book.live[: book.used[LIVE]])
+        live, inner = book.live[: book.used[LIVE]], book.inner[: book.used[INNER]]
+        return Fleet(*book[:7], live, book.lane, book.change_s, inner)
 
     @property
     def history(self) -> Iterator[Commitment]:
@@ -76,6 +78,10 @@ class Ledger:
     def merge_time_s(self, row: int) -> float:
         """Returns the committed merge time (s), as ``vehicles.merge_state`` reads it."""
         return float(self.book.merge_time_s[row])
+
+    def lane(self, row: int) -> int:
+        """Returns the mainline's lane by which a vehicle came, 0 for the outermost and the ramp."""
+        return int(self.book.lane[row])
 
     def length_m(self, row: int) -> float:
         """Returns the length (m) of a vehicle."""

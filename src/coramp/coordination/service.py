@@ -35,6 +35,7 @@ class Service:
         self._drivers = DriverRoad(is_metered(strategy), ask_drivers)
         self._step, self._step_s = -1, rules.control.step_s
         self._asked: set[str] = set()
+        self._lanes = rules.road.lanes
         self.coordinator = Coordinator(
             strategy, rules, self._feed, fastest_entry_mps, self._channel, self._drivers
         )
@@ -71,6 +72,10 @@ class Service:
 
     def _hear(self, request: RequestToEnter, step: int) -> None:
         self._check_time(f"{request.vehicle_id}: asks to enter", request.step, step)
+        most = 0 if request.on_ramp else self._lanes - 1
+        if not 0 <= request.lane <= most:
+            asked = f"{request.vehicle_id}: asks to enter on lane {request.lane}"
+            raise CorampError(f"{asked}; allowed is 0 to {most}")
         try:
             self._feed.append(request)
         except ValueError as error:

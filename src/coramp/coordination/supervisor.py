@@ -6,6 +6,7 @@ stops before the nose. What it lets pass is committed. What it refuses is not dr
 keeps its last commitment, which is safe to its end.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -163,6 +164,7 @@ def _commit_if_safe(
         pieces.reshape((1, len(pieces), 4)),
         np.array([merge_s]),
         np.zeros(1, np.int64),
+        np.full(1, math.inf),
     )
     if examine(record, change, now_s, from_s, bounds).code != ACCEPTED:
         return False

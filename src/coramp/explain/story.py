@@ -138,6 +138,8 @@ def told(decision: dict[str, Any], vehicles_differ: bool = False) -> str:
             how = "free movement is safe as it is: it merges"
         case "reach":
             how = f"an acceleration of {decision['accel_mps2']:.3f} m/s2 reaches a gap: it merges"
+        case "make way":
+            how = f"{moved} makes way to the lane further in: it merges"
         case "create":
             how = f"a gap is made (scenario {decision['scenario']}, moving {moved}): it merges"
         case "delay":

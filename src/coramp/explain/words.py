@@ -17,6 +17,7 @@ NOT_TOLD = "the strategy does not tell what it tried"
 _WAYS = {
     ("free", 0): "free movement",
     ("reach", 0): "another acceleration",
+    ("make way", 0): "the vehicle in conflict makes way",
     ("create", 0): "a gap made",
     ("create", 1): "X moves ahead",
     ("create", 2): "Y falls back",
@@ -43,6 +44,10 @@ _BY_VEHICLE = {
     a.REASONS[t.FOLLOWERS_CANNOT_BRAKE]: "{} behind it on the ramp cannot brake for it",
     a.REASONS[t.CANNOT_FALL_BACK]: "{} cannot fall back for it",
     a.REASONS[t.CANNOT_FOLLOW]: "it cannot follow {} at a safe distance",
+    a.REASONS[t.LEAVES_LANE]: "{} is changing lanes already",
+    a.REASONS[t.NOT_ON_MAINLINE]: "{} is still on the ramp",
+    a.REASONS[t.NO_GAP_FURTHER_IN]: "{} cannot move to a gap further in",
+    a.REASONS[t.CHANGE_TOO_LATE]: "{} could not change lanes before it reaches the nose",
 }
 """Reasons that name the vehicle which cannot do its part."""
 _TOO_NEAR = a.REASONS[t.TOO_NEAR]
@@ -91,7 +96,9 @@ def _line(row: Row) -> str:
     front, rear = row["front_vehicle_id"], row["rear_vehicle_id"]
     nowhere = row["merge_time_s"] is None and front is None and rear is None
     place = "" if nowhere else f" {where(front, rear)}"
-    way = _way(row)
+    way, moved = _way(row), row["moved_vehicle_id"]
+    if row["rung"] == "make way" and moved is not None:
+        way = f"{moved} makes way"
     if row["rung"] == "reach" and row["accel_mps2"] is not None:
         way = f"an acceleration of {row['accel_mps2']:.3f} m/s2"
     return f"{row['attempt']}. {way}{place}: {reason_in_words(row)}"
@@ -108,7 +115,8 @@ def reason_in_words(row: Row) -> str:
         of_whom = "" if other is None else f" ({other}{by})"
         return f"{reason}: {row['checker_reason']}{of_whom}"
     if reason == _TOO_NEAR:
-        return f"{moved or 'it'} would come too near to {other}{by}"
+        where_to = " further in" if row["rung"] == "make way" and moved else ""
+        return f"{moved or 'it'} would come too near to {other}{where_to}{by}"
     if reason in _BY_AMOUNT and missing_m is not None:
         return _BY_AMOUNT[reason].format(_metres(missing_m))
     if reason in _BY_VEHICLE and other is not None:

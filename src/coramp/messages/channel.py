@@ -4,6 +4,7 @@ The channel stands between coordinator and world only where messages are kept; e
 calls the world itself. What vehicles tell does not pass through it.
 """
 
+import math
 from typing import Protocol
 
 from coramp._kernel import FloatArray
@@ -22,8 +23,13 @@ class Plant(Protocol):
         """Puts a vehicle with its front at the start of its zone, at its entry speed."""
         ...
 
-    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
-        """Makes a vehicle follow the pieces from their first time on; merge at that time."""
+    def follow(
+        self, row: int, pieces: FloatArray, merge_time_s: float, lane_change_s: float = math.inf
+    ) -> None:
+        """Makes a vehicle follow the pieces from their first time on; merge at that time.
+
+        It begins to change to the next lane further in at ``lane_change_s``, if that is a time.
+        """
         ...
 
 
@@ -53,13 +59,15 @@ class Channel:
         if self._world is not None:
             self._world.enter(row, arrival, step)
 
-    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+    def follow(
+        self, row: int, pieces: FloatArray, merge_time_s: float, lane_change_s: float = math.inf
+    ) -> None:
         """Carries a command, which for a vehicle that enters is its entry."""
-        kind = Enter if row == self._entering else Follow
-        self._entering = -1
-        self.commands.append(kind(self._names[row], self._step, pieces.copy(), merge_time_s))
+        told = self._names[row], self._step, pieces.copy(), merge_time_s
+        enters, self._entering = row == self._entering, -1
+        self.commands.append(Enter(*told) if enters else Follow(*told, lane_change_s))
         if self._world is not None:
-            self._world.follow(row, pieces, merge_time_s)
+            self._world.follow(row, pieces, merge_time_s, lane_change_s)
 
     def taken(self) -> tuple[WorldCommand, ...]:
         """Returns what has been commanded since this was last asked."""

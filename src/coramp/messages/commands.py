@@ -1,5 +1,6 @@
 """What the coordinator tells the world."""
 
+import math
 from dataclasses import dataclass
 
 from coramp._kernel import FloatArray
@@ -19,13 +20,15 @@ class Enter:
 class Follow:
     """Follow these pieces from their first time on; commanded at ``step``.
 
-    ``merge_time_s`` is as ``vehicles.merge_state`` reads it.
+    ``merge_time_s`` is as ``vehicles.merge_state`` reads it. ``lane_change_s`` is when to begin to
+    change to the next lane further in, infinity to stay on one's lane, or as commanded before.
     """
 
     vehicle_id: str
     step: int
     pieces: FloatArray
     merge_time_s: float
+    lane_change_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

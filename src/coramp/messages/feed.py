@@ -21,6 +21,7 @@ class Requests(NamedTuple):
     on_ramp: BoolArray
     speed_mps: FloatArray
     traits: FloatArray
+    lane: IntArray
 
 
 class RequestFeed:
@@ -38,6 +39,7 @@ class RequestFeed:
             np.array(columns.on_ramp, np.bool_),
             np.array(columns.speed_mps, np.float64),
             _traits_rows(columns.length_m, columns.traits),
+            np.array(columns.lane, np.int64),
         )
         if (np.diff(self.arrays.step) < 0).any():
             raise ValueError("requests must come in order of time")
@@ -62,6 +64,7 @@ class RequestFeed:
         arrays.step[place], arrays.on_ramp[place] = request.step, request.on_ramp
         arrays.speed_mps[place] = request.speed_mps
         arrays.traits[place] = _traits_rows([request.length_m], [request.traits])[0]
+        arrays.lane[place] = request.lane
         self._list.append(request)
 
 

@@ -22,7 +22,7 @@ import polars as pl
 
 from coramp.vehicles.traits import Traits
 
-LOG_VERSION = 2
+LOG_VERSION = 3
 """Raised whenever messages get other columns, or mean something else."""
 TRAIT_COLUMNS = tuple(Traits._fields)
 """Columns of what a vehicle can do: null where only the common limits bind it."""
@@ -47,6 +47,8 @@ COLUMNS: dict[str, pl.DataType | type[pl.DataType]] = {
     "green": pl.Boolean,
     "vehicle_type": pl.String,
     **{name: pl.Float64 for name in TRAIT_COLUMNS if name != "length_m"},
+    "lane": pl.Int64,
+    "lane_change_s": pl.Float64,
 }
 """The columns of a log. A message has those of its kind, and null in all others."""
 EVERY_KIND = ("version", "time_s", "kind")
@@ -95,10 +97,12 @@ KINDS = {
     COMPARISON: Kind(OBEYING, _POSITION, ("accel_mps2",)),
     READING: Kind(1, ("mainline_occupancy", "queue_occupancy", "passed_veh")),
     REQUEST: Kind(
-        2, ("stream", "speed_mps", "length_m", "vehicle_type", "vehicle_id"), TRAIT_COLUMNS
+        2,
+        ("stream", "speed_mps", "length_m", "vehicle_type", "vehicle_id"),
+        (*TRAIT_COLUMNS, "lane"),
     ),
     ENTRY: Kind(3, _TRAJECTORY, ("merge_time_s",)),
-    COMMAND: Kind(3, _TRAJECTORY, ("merge_time_s",)),
+    COMMAND: Kind(3, _TRAJECTORY, ("merge_time_s", "lane_change_s")),
     ACKNOWLEDGEMENT: Kind(3, ("of_s", "vehicle_id")),
     SIGNAL: Kind(3, ("green",)),
     END: Kind(5),

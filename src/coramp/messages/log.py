@@ -4,6 +4,7 @@ One row a message, in the order in which they were told. Row 0 is the first. ``m
 the kinds and their columns, ``messages.log_reader`` reads a log back.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.messages.commands import Enter, SetSignal, WorldCommand
+from coramp.messages.commands import Enter, Follow, SetSignal, WorldCommand
 from coramp.messages.events import DetectorReading, RequestToEnter
 from coramp.messages.kinds import (
     ACKNOWLEDGEMENT,
@@ -150,7 +151,15 @@ def _request(request: RequestToEnter, step_s: float) -> dict[str, Any]:
         speed_mps=request.speed_mps,
         vehicle_type=request.vehicle_type,
         **{"length_m": request.length_m, **_traits(request)},
+        **({"lane": request.lane} if request.lane else {}),
     )
+
+
+def _lane_change(command: Enter | Follow) -> dict[str, float]:
+    """Returns when a vehicle is to begin to change lanes, if it is to."""
+    if isinstance(command, Enter) or math.isinf(command.lane_change_s):
+        return {}
+    return {"lane_change_s": command.lane_change_s}
 
 
 def _traits(request: RequestToEnter) -> dict[str, Any]:
@@ -173,6 +182,7 @@ def _command(command: WorldCommand, step_s: float) -> list[dict[str, Any]]:
         vehicle_id=command.vehicle_id,
         merge_time_s=merge_s if is_planned(merge_s) else None,
         **dict(zip(PIECES, command.pieces.T.tolist(), strict=True)),
+        **_lane_change(command),
     )
     answer = _row(ACKNOWLEDGEMENT, time_s, vehicle_id=command.vehicle_id, of_s=time_s)
     return [given, answer]

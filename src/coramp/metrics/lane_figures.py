@@ -36,15 +36,16 @@ def bound_figures(
 ) -> dict[str, float | None]:
     """Returns the mean delay of all vehicles and what the lane allows; null for drivers.
 
-    It is null as well where vehicles differ in more than their lengths: the bound is one for equal
-    vehicles.
+    It is null as well where vehicles differ in more than their lengths, and where the mainline has
+    several lanes: the bound is one for equal vehicles on one lane.
 
     The streams' delays first come, first served, are those of the arrivals alone. The bound holds
     for this run whatever its plans: where they brought a vehicle out earlier than its free
     movement, or two closer than h, that is granted.
     """
     mean_s = _known(float(np.mean(delay_s))) if len(delay_s) else None
-    if not outcome.cooperative or scenario.vehicles_differ:
+    one_lane = scenario.mainline.lanes == 1
+    if not outcome.cooperative or scenario.vehicles_differ or not one_lane:
         return {"delay_s": mean_s, **dict.fromkeys(BOUND_FIGURES)}
     passages, rules = outcome.passages, scenario.rules()
     shortest_m = passages.length_m.min() if len(passages) else scenario.usual_length_m

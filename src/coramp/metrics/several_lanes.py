@@ -12,15 +12,15 @@ from coramp.scenarios.model import Scenario
 def several_lanes_figures(outcome: Outcome, scenario: Scenario, delay_s: FloatArray) -> Row:
     """Returns the figures of a road with several lanes; null on a road of one lane.
 
-    ``made_way`` is of automated vehicles alone, which change lanes on the mainline for nothing
-    else; it is null where nobody is automated.
+    ``made_way`` is of automated vehicles alone, as all are that have plans, which change lanes on
+    the mainline for nothing else; it is null where nobody is automated.
     """
     if scenario.mainline.lanes == 1:
         return dict.fromkeys(LANE_METRICS)
     passages = outcome.passages
     outer = ~passages.on_ramp & (passages.lane == 0)
     changed = changed_further_in(outcome.lanes)
-    automated = passages.automated
+    automated = np.ones(len(passages), np.bool_) if outcome.cooperative else passages.automated
     return {
         "outer_lane_delay_s": float(delay_s[outer].mean()) if outer.any() else None,
         "made_way": None if automated is None else int(automated[changed].sum()),

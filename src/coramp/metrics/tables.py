@@ -41,7 +41,7 @@ from coramp.records.schemas import (
 )
 from coramp.road.streams import STREAMS
 from coramp.scenarios.model import Scenario
-from coramp.strategies.situation import RUNGS
+from coramp.strategies.situation import RUNGS, RUNGS_OF_ONE_LANE
 from coramp.vehicles.traits import MASS
 
 Columns = Mapping[str, Any]
@@ -286,7 +286,7 @@ def _stream_metrics(streams: list[Row]) -> Row:
 def _decision_figures(outcome: Outcome) -> Row:
     """How many ramp vehicles each rung served (hold: how many waited), how many others moved."""
     if not outcome.cooperative:
-        rungs = {f"rung_{rung}": None for rung in RUNGS}
+        rungs = {f"rung_{rung}": None for rung in RUNGS_OF_ONE_LANE}
         return {
             "adjusted_vehicles": None,
             **rungs,
@@ -300,7 +300,7 @@ def _decision_figures(outcome: Outcome) -> Row:
         adjusted.update(decision.adjusted_rows)
     return {
         "adjusted_vehicles": len(adjusted),
-        **{f"rung_{rung}": len(rows) for rung, rows in served.items()},
+        **{f"rung_{rung}": len(served[rung]) for rung in RUNGS_OF_ONE_LANE},
         "refused_plans": len(outcome.refusals),
         "interventions": outcome.interventions,
     }

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
+from coramp.road.lanes import LANE_CHANGE_LASTS_S
 
 NO_MAINLINE = -1
 """The number of the ramp with its acceleration lane."""
@@ -62,6 +63,31 @@ def planned_history(
         np.concatenate([until_s, np.where(np.isnan(merge_s), until_s, merge_s)]),
         np.concatenate([on_ramp, np.zeros(len(vehicles), np.bool_)]),
     )
+
+
+def with_lanes_further_in(
+    history: LaneHistory, lane: IntArray, change_s: FloatArray
+) -> LaneHistory:
+    """Returns a planned history of a mainline of several lanes.
+
+    Arrays have one entry a vehicle: the lane by which it came, and when it begins to change to the
+    next one (s; infinity for never). It is on both while it changes.
+    """
+    if not lane.any() and np.isinf(change_s).all():
+        return history
+    begins_s, on_mainline = change_s[history.vehicle], history.lane > NO_MAINLINE
+    ends_s = np.fmin(history.until_s, begins_s + LANE_CHANGE_LASTS_S)
+    own = np.where(on_mainline, lane[history.vehicle], NO_MAINLINE)
+    changed = on_mainline & (begins_s < history.until_s)
+    stays = history._replace(lane=own, until_s=np.where(on_mainline, ends_s, history.until_s))
+    more = LaneHistory(
+        history.vehicle[changed],
+        own[changed] + 1,
+        begins_s[changed],
+        history.until_s[changed],
+        np.zeros(int(changed.sum()), np.bool_),
+    )
+    return LaneHistory._make(np.concatenate(pair) for pair in zip(stays, more, strict=True))
 
 
 def seen_history(

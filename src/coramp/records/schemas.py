@@ -4,7 +4,7 @@ from typing import Any
 
 import polars as pl
 
-from coramp.strategies.situation import RUNGS
+from coramp.strategies.situation import RUNGS_OF_ONE_LANE
 
 Row = dict[str, Any]
 """One row of a table, by column."""
@@ -211,7 +211,7 @@ _FIRST_METRICS: Schema = {
     "max_decel_mps2": pl.Float64,
     "plan_error_m": pl.Float64,
     "adjusted_vehicles": pl.Int64,
-    **{f"rung_{rung}": pl.Int64 for rung in RUNGS},
+    **{f"rung_{rung}": pl.Int64 for rung in RUNGS_OF_ONE_LANE},
     "refused_plans": pl.Int64,
     "interventions": pl.Int64,
     "max_jerk_mps3": pl.Float64,

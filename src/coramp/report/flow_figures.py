@@ -21,7 +21,7 @@ from coramp.report.style import (
     new_figure,
 )
 from coramp.road.streams import STREAMS
-from coramp.strategies.situation import RUNGS
+from coramp.strategies.situation import RUNGS_OF_ONE_LANE
 from coramp.studies.metric_labels import RUNG_COLUMNS
 from coramp.studies.paper_layout import (
     LEAST_BASELINE_S,
@@ -38,7 +38,7 @@ PRINTED = {"mainline": MAINLINE_DELAY_S, "ramp": RAMP_DELAY_S}
 CELLS = [Cell(s, None) for s in STRATEGIES] + [Cell("uncontrolled", p) for p in POPULATIONS]
 LINEAR_TO_S = 0.1
 """Up to here the axis of delays is linear, beyond it logarithmic."""
-*MERGING, HOLD = RUNGS
+*MERGING, HOLD = RUNGS_OF_ONE_LANE
 RUNG_COLOURS = dict(zip(MERGING, (SKY, BLUE, ORANGE, GREEN), strict=True))
 RUNG_WORDS = {
     "free": "free: as it is",
@@ -216,7 +216,7 @@ def rung_shares(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Returns each rung's share (%) of all merges at each flow, and of vehicles that waited."""
     plain = runs.filter(pl.col("overrides").is_null() & (pl.col("strategy") == strategy))
-    counts = np.zeros((len(RUNGS), len(flows)))
+    counts = np.zeros((len(RUNGS_OF_ONE_LANE), len(flows)))
     for k, (mainline, ramp) in enumerate(flows):
         at = plain.filter(mainline_veh_h=float(mainline), ramp_veh_h=float(ramp))
         counts[:, k] = [at[RUNG_COLUMNS[rung]].sum() for rung in (*MERGING, HOLD)]

@@ -2,6 +2,12 @@
 
 LANES = ("ramp", "acceleration", "mainline")
 """Names of the lanes, in the order of their codes: before the nose, beside and on the mainline."""
+LANE_CHANGE_LASTS_S = 4.5
+"""How long a change to the mainline's next lane takes, while a vehicle counts on both lanes.
+
+Over the 3.2 m of SUMO's lanes, a lateral acceleration that is a sine has a peak of
+2 pi w / T^2 = 0.99 m/s2. UN R79 allows 1 m/s2 for an automated change of lanes, and 5 s.
+"""
 RAMP, ACCELERATION_LANE, MAINLINE = range(len(LANES))
 """Codes of the lanes: where pieces lie, and how far a vehicle's merge has come."""
 

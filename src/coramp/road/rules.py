@@ -8,11 +8,12 @@ from coramp._kernel import FloatArray, kernel
 
 
 class Road(NamedTuple):
-    """One mainline lane, one ramp and the acceleration lane between them.
+    """The mainline, one ramp and the acceleration lane between them.
 
     Stations are metres of a front bumper along the mainline, 0 at the end of the ramp (the nose),
     growing downstream; the ramp has negative stations of its own, the acceleration lane positive
-    ones that run beside the mainline's.
+    ones that run beside the mainline's. Of the mainline's ``lanes`` the outermost is next to the
+    ramp.
     """
 
     mainline_start_m: float
@@ -26,6 +27,7 @@ class Road(NamedTuple):
     ramp_speed_mps: float
     ramp_limit_mps: float
     merge_angle_rad: float
+    lanes: int = 1
 
 
 class SafetyBudget(NamedTuple):
@@ -129,37 +131,38 @@ def unpacked(numbers: FloatArray) -> Rules:
             ramp_speed_mps=n[8],
             ramp_limit_mps=n[9],
             merge_angle_rad=n[10],
+            lanes=int(n[11]),
         ),
         safety=SafetyBudget(
-            positioning_error_m=n[11],
-            clock_error_s=n[12],
-            adhesion=n[13],
-            resistance=n[14],
-            time_gap_s=n[15],
-            standstill_gap_m=n[16],
-            execution_allowance_m=n[17],
-            follower_clock_extra_s=n[18],
+            positioning_error_m=n[12],
+            clock_error_s=n[13],
+            adhesion=n[14],
+            resistance=n[15],
+            time_gap_s=n[16],
+            standstill_gap_m=n[17],
+            execution_allowance_m=n[18],
+            follower_clock_extra_s=n[19],
         ),
         motion=MotionLimits(
-            speed_up_mps2=n[19],
-            slow_down_mps2=n[20],
-            comfort_mps2=n[21],
-            stop_mps2=n[22],
-            ramp_acceleration_mps2=n[23],
-            free_acceleration_mps2=n[24],
-            speed_deviation=n[25],
-            slowest_ramp_speed_mps=n[26],
-            slow_deviation=n[27],
+            speed_up_mps2=n[20],
+            slow_down_mps2=n[21],
+            comfort_mps2=n[22],
+            stop_mps2=n[23],
+            ramp_acceleration_mps2=n[24],
+            free_acceleration_mps2=n[25],
+            speed_deviation=n[26],
+            slowest_ramp_speed_mps=n[27],
+            slow_deviation=n[28],
         ),
         control=Control(
-            step_s=n[28],
-            actuation_delay_s=n[29],
-            retry_s=n[30],
-            gap_at_front=n[31] != 0.0,
-            create_from_nose=n[32] != 0.0,
+            step_s=n[29],
+            actuation_delay_s=n[30],
+            retry_s=n[31],
+            gap_at_front=n[32] != 0.0,
+            create_from_nose=n[33] != 0.0,
         ),
         traffic=Traffic(
-            differs=n[33] != 0.0,
-            extra_safe_distance_m=n[34],
+            differs=n[34] != 0.0,
+            extra_safe_distance_m=n[35],
         ),
     )

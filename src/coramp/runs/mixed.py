@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from coramp.errors import CorampError
+from coramp.scenarios.checks import problems_of_planning
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.world_sections import TABLES
-from coramp.strategies.base import Strategy, coordinates_meters, steps_of_period
+from coramp.strategies.base import Strategy, coordinates_meters, makes_way, steps_of_period
 from coramp.strategies.registry import strategies
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M
 from coramp.worlds.sumo.mixed_setup import safety_law_of
@@ -18,6 +19,29 @@ def coordinates_drivers(strategy: type[Strategy]) -> bool:
     return hasattr(strategy, "steer")
 
 
+def plans_in_lanes(scenario: Scenario, strategy: type[Strategy], engine: str) -> bool:
+    """Returns whether a run on several lanes is planned: all vehicles automated, engine exact.
+
+    Raises CorampError where it would be, and the strategy or the road does not allow that.
+    """
+    if engine != "exact" or not _is_plannable(scenario) or coordinates_drivers(strategy):
+        return False
+    if not makes_way(strategy):
+        able = ", ".join(name for name, kind in strategies().items() if makes_way(kind))
+        raise CorampError(
+            f"strategy: {strategy.name} plans for one lane, and mainline.lanes is above 1; "
+            f"allowed are {able}, or mainline.lanes 1"
+        )
+    if problems := problems_of_planning(scenario):
+        raise CorampError(problems[0])
+    return True
+
+
+def _is_plannable(scenario: Scenario) -> bool:
+    """Whether all could be planned ahead on its road: nobody drives, nothing fails, no network."""
+    return scenario.network is None and not (scenario.is_mixed or scenario.has_faults)
+
+
 def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, population: str) -> None:
     """Raises CorampError if a strategy, an engine or drivers cannot be those of mixed traffic."""
     why, instead = _asked_for(scenario)
@@ -25,8 +49,11 @@ def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, popul
         raise CorampError(f"engine: {engine} cannot run where {why}; choose sumo, or {instead}")
     if strategy.cooperative and not coordinates_drivers(strategy):
         able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
+        instead = f"or {instead}"
+        if makes_way(strategy) and _is_plannable(scenario):
+            instead = f"engine exact, {instead}"
         raise CorampError(
-            f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, or {instead}"
+            f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, {instead}"
         )
     if coordinates_drivers(strategy) and (line := _lag_problem(scenario, strategy)):
         raise CorampError(line)

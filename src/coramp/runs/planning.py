@@ -52,6 +52,11 @@ def plan_snapshot(snapshot: Snapshot, strategy: str) -> PlannedSnapshot:
             "vehicle: a situation is planned for vehicles that are alike but for their length; "
             "allowed are types without limits of their own"
         )
+    if scenario.mainline.lanes > 1:
+        raise CorampError(
+            f"mainline.lanes: a situation is planned on one lane, not on "
+            f"{scenario.mainline.lanes}; allowed is 1"
+        )
     if not strategy_named(strategy).cooperative:
         raise CorampError(f"strategy: {strategy} plans nothing; choose a cooperative one")
     vehicles = sorted(snapshot.vehicles, key=lambda v: (v.stream, -v.station_m))

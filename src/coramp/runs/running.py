@@ -18,7 +18,12 @@ from coramp.metrics.tables import RunTables, tables_of
 from coramp.records.run import RunRecords
 from coramp.records.schemas import PLANNING_TIMES, RESULT_VERSION, RUN_METRICS, Row
 from coramp.runs.metering import check_metering, room_notice
-from coramp.runs.mixed import broken_among_drivers, check_mixed, coordinates_drivers
+from coramp.runs.mixed import (
+    broken_among_drivers,
+    check_mixed,
+    coordinates_drivers,
+    plans_in_lanes,
+)
 from coramp.runs.unserved import unheeded_line, unserved_line
 from coramp.scenarios.loading import drivers_checked, load_scenario
 from coramp.scenarios.model import Scenario
@@ -98,7 +103,8 @@ class RunSpec:
         coordinates = strategy_named(self.strategy).cooperative
         scenario = self.scenario
         other = scenario.is_mixed or scenario.has_faults or not scenario.has_one_lane
-        return coordinates and other and scenario.has_automated
+        planned = self.engine == "exact"
+        return coordinates and other and scenario.has_automated and not planned
 
     @property
     def settings(self) -> str | None:
@@ -156,6 +162,8 @@ def make_spec(
     loaded = load_scenario(scenario, {**others, **_as_floats(named)}, blame, populations)
     among_drivers = loaded.is_mixed or loaded.has_faults or not loaded.has_one_lane
     plans_ahead = loaded.has_one_lane and not (among_drivers and coordinates_drivers(chosen))
+    if among_drivers and plans_in_lanes(loaded, chosen, engine):
+        among_drivers, plans_ahead = False, True
     if plans_ahead:  # elsewhere each vehicle's own limits bind it as it drives
         check_vehicles_may_differ(loaded, chosen.name)
     if engine == "sumo" and chosen.cooperative and loaded.drift_problem:

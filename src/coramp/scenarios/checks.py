@@ -35,11 +35,8 @@ def problems_of(scenario: "Scenario") -> list[str]:
 def _speed_problems(scenario: "Scenario") -> list[str]:
     mainline, ramp = scenario.mainline, scenario.ramp
     problems = []
-    if ramp.speed_mps >= mainline.speed_mps and scenario.has_one_lane:
-        problems.append(
-            f"ramp.speed_mps: {ramp.speed_mps:g} is not below mainline.speed_mps; "
-            f"the method needs a ramp slower than {mainline.speed_mps:g} m/s"
-        )
+    if scenario.has_one_lane:
+        problems += _fast_ramp_problems(scenario)
     for name, stream in (("mainline", mainline), ("ramp", ramp)):
         low, high = stream.entry_speed_mps
         if low > high:
@@ -53,6 +50,19 @@ def _speed_problems(scenario: "Scenario") -> list[str]:
                     f"allowed is up to {stream.limit_mps:g} m/s"
                 )
     return problems
+
+
+def _fast_ramp_problems(scenario: "Scenario") -> list[str]:
+    ramp_mps, v0 = scenario.ramp.speed_mps, scenario.mainline.speed_mps
+    if ramp_mps < v0:
+        return []
+    line = f"ramp.speed_mps: {ramp_mps:g} is not below mainline.speed_mps; "
+    return [f"{line}the method needs a ramp slower than {v0:g} m/s"]
+
+
+def problems_of_planning(scenario: "Scenario") -> list[str]:
+    """Returns a line for all that keeps a scenario of several lanes from being planned."""
+    return _fast_ramp_problems(scenario) or _planning_problems(scenario)
 
 
 def _motion_problems(scenario: "Scenario") -> list[str]:

@@ -235,6 +235,7 @@ class Scenario(Model):
                 ramp_speed_mps=self.ramp.speed_mps,
                 ramp_limit_mps=self.ramp.limit_mps,
                 merge_angle_rad=math.radians(self.ramp.merge_angle_deg),
+                lanes=self.mainline.lanes,
             ),
             SafetyBudget(**self.safety.model_dump()),
             MotionLimits(
@@ -260,7 +261,7 @@ class Scenario(Model):
     def decision_station_m(self) -> float:
         """Where ramp vehicles are planned: as given, or as suits the speeds."""
         given = self.ramp.decision_station_m
-        if given is None and not self.has_one_lane:
+        if given is None and self.network is not None:
             return 0.5 * self.ramp.start_m  # nobody is planned there
         return chosen_decision_station_m(self) if given is None else given
 

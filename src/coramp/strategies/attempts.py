@@ -34,6 +34,11 @@ REASONS = {
     t.NO_EASY_WAY: "the limits of speed or acceleration allow no way of least effort",
     t.CANNOT_FOLLOW: "it cannot follow the vehicle ahead at a safe distance",
     t.LEADER_WAITS: "a vehicle ahead of it on the ramp has no merge yet",
+    t.LEAVES_LANE: "a vehicle that would move is changing lanes",
+    t.NOT_ON_MAINLINE: "the vehicle in conflict is still on the ramp",
+    t.CHANGE_TOO_LATE: "the vehicle in conflict could not change lanes before the nose is reached",
+    t.NO_GAP_FURTHER_IN: "the vehicle in conflict cannot move to a gap further in",
+    t.HOLDS_UP_FURTHER_IN: "a vehicle that is yet to enter further in would be held up",
 }
 """Why an attempt failed, by the codes of ``vehicles.trace``."""
 
@@ -41,13 +46,13 @@ REASONS = {
 class Attempt(NamedTuple):
     """One attempt of a decision; rows are -1 and numbers nan where there is none.
 
-    ``reason`` is CHOSEN for the attempt that is carried out, else why it was refused: because of
-    ``other_row``, by ``missing_m``. Where a vehicle that moves aside, and not the subject, comes
-    too near to it, that is ``moved_row``. The subject would pass the nose at ``nose_time_s`` and
-    cruise at ``intercept_m`` + v0 t. The vehicles before and behind the gap would move by
-    ``ahead_m`` and ``back_m`` from ``moves_from_s`` on. The equations of the merge rest on free
-    movement's acceleration, the lengths of the subject and of the vehicle ahead, and the clearance
-    that is planned on either side.
+    ``reason`` is CHOSEN for the attempt that is carried out, else why it was refused: because
+    of ``other_row``, by ``missing_m``. Where a vehicle that moves aside, and not the subject,
+    comes too near to it, that is ``moved_row``; so is the vehicle that makes way. The subject
+    would pass the nose at ``nose_time_s`` and cruise at ``intercept_m`` + v0 t. The vehicles
+    before and behind the gap would move by ``ahead_m`` and ``back_m`` from ``moves_from_s`` on.
+    The equations of the merge rest on free movement's acceleration, the lengths of the subject
+    and of the vehicle ahead, and the clearance that is planned on either side.
     """
 
     rung: str

@@ -5,6 +5,7 @@ to be woken and, if it has a ``period_s``, once in each such period, then withou
 answers from the view and its own memory alone: ``decide`` is a pure function.
 """
 
+import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -98,6 +99,9 @@ NOBODY_WAITS = Waiting(np.empty(0, np.int64), np.empty(0, np.bool_), np.empty(0)
 class View:
     """What the coordinator knows at ``time_s``: who has entered, and what they have committed to.
 
+    Of several mainline lanes the outermost is the mainline; ``fleet.inner`` are on those further
+    in, of whom nothing else tells.
+
     ``subjects`` are the rows that the strategy is asked about, in the order in which they reached
     their decision stations. ``acknowledged`` holds the commitments that vehicles have confirmed;
     in a world without delays it is ``fleet`` itself. ``fastest_entry_mps`` bounds the speed at
@@ -152,12 +156,15 @@ class FollowTrajectory:
     ``time_s + actuation_delay_s``; their first time is that, their first station and speed what is
     committed for then. ``makes_gap`` tells that the vehicle moves aside for another:
     the checker then allows it more than v0, by ``motion.speed_deviation``, until the merge.
+    ``lane_change_s`` is when it begins to change to the next lane further in, which takes
+    ``road.lanes.LANE_CHANGE_LASTS_S``; infinity for a command that leaves its lane as it is.
     """
 
     row: int
     pieces: FloatArray
     merge_time_s: float
     makes_gap: bool = False
+    lane_change_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +284,8 @@ class Strategy(Decider, Protocol):
     for one that needs a signal and detectors on the ramp, in SUMO; ``coordinates_meters`` for one
     that is for several ramps (``strategies.metering``). ``vehicles_may_differ`` is True
     for one that plans with vehicles' own limits; others are refused where vehicles differ.
+    ``makes_way`` is True for one that plans on a mainline of several lanes (``View``); others are
+    refused there.
     ``entry_policy`` is what it
     asks of entries, if anything: see ``entry_policy_of``. One whose parameters must fit
     together has a method ``problems()``, which returns lines ``parameter: what is wrong; what is
@@ -312,6 +321,11 @@ def held_period_s(period_s: float, rules: Rules) -> float:
 def vehicles_may_differ(strategy: Decider | type[Strategy]) -> bool:
     """Returns whether a strategy looks at each vehicle's own limits, not at its length alone."""
     return bool(getattr(strategy, "vehicles_may_differ", False))
+
+
+def makes_way(strategy: Decider | type[Strategy]) -> bool:
+    """Returns whether a strategy plans on a mainline of several lanes."""
+    return bool(getattr(strategy, "makes_way", False))
 
 
 def is_metered(strategy: Decider | type[Strategy]) -> bool:

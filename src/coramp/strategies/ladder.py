@@ -13,6 +13,7 @@ from coramp.strategies.base import Decision, Explanation, FollowTrajectory, Memo
 from coramp.strategies.rungs import Merge
 from coramp.strategies.situation import (
     RUNG_HOLD,
+    RUNG_MAKE_WAY,
     RUNGS,
     MergePlan,
     Situation,
@@ -51,7 +52,33 @@ def plan_of(
     conflict: int,
     rules: Rules,
 ) -> MergePlan:
-    """Returns the plan that a rung's merge amounts to; ``gap`` is -1 for a hold."""
+    """Returns the plan that a rung's merge amounts to; ``gap`` is -1 for a hold.
+
+    ``conflict`` is the place of the conflict vehicle in the lane order, -1 for none.
+    """
+    conflict_row = situation.order[conflict] if conflict >= 0 else -1
+    conflict_m = station_at_decision_m(situation, conflict, rules)
+    return plan_about(
+        fleet, proposal, situation, merge, rung, scenario, conflict_row, conflict_m, rules
+    )
+
+
+@kernel
+def plan_about(
+    fleet: Fleet,
+    proposal: Proposal,
+    situation: Situation,
+    merge: Merge,
+    rung: int,
+    scenario: int,
+    conflict_row: int,
+    conflict_m: float,
+    rules: Rules,
+) -> MergePlan:
+    """Returns the plan of ``plan_of`` about a conflict vehicle, -1 for none, and its station (m).
+
+    One that makes way is on another lane at the merge, and so in no conflict any more.
+    """
     order, gap = situation.order, merge.gap
     own_length_m = fleet.length_m[situation.subject]
     note_subject(proposal.trace, situation.free_accel_mps2, own_length_m, situation.clearance_m)
@@ -59,9 +86,7 @@ def plan_of(
         front_length_m = fleet.length_m[order[gap - 1]] if gap > 0 else math.nan
         note_choice(proposal.trace, rung, scenario, front_length_m)
     before = after = (math.nan, math.nan)
-    conflict_row = -1
-    if conflict >= 0:
-        conflict_row = order[conflict]
+    if conflict_row >= 0:
         other_length_m = fleet.length_m[conflict_row]
         free_s = (
             situation.nose_s
@@ -75,7 +100,7 @@ def plan_of(
             free_s,
             rules,
         )
-        if gap >= 0:
+        if gap >= 0 and rung != RUNG_MAKE_WAY:
             after = severity_at_merge(
                 merge.merge_station_m,
                 own_length_m,
@@ -102,7 +127,7 @@ def plan_of(
         after[1],
         situation.nose_s,
         situation.nose_speed_mps,
-        station_at_decision_m(situation, conflict, rules),
+        conflict_m,
         station_at_decision_m(situation, gap - 1, rules),
         station_at_decision_m(situation, gap if gap >= 0 else len(order), rules),
     )
@@ -145,6 +170,7 @@ def decide_first(planner: Planner, view: View, memory: Memory) -> Decision:
             proposal.pieces[k, : proposal.piece_count[k]].copy(),
             float(proposal.merge_time_s[k]),
             makes_gap=k > 0,
+            lane_change_s=float(proposal.lane_change_s[k]),
         )
         for k in range(int(proposal.size[0]))
     )

@@ -1,7 +1,8 @@
 """Mainline priority (section IV of the paper): the ramp vehicle looks for its gap.
 
-The ladder: free movement; an acceleration that reaches a large enough gap; a gap made on the
-mainline by X moving ahead, Y falling back, or both; a later gap; a stop before the nose.
+The ladder: free movement; an acceleration that reaches a large enough gap; of several lanes, the
+place of a vehicle that makes way; a gap made on the mainline by X moving ahead, Y falling back, or
+both; a later gap; a stop before the nose.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
+from coramp.strategies.make_way import make_way, plan_of_way
 from coramp.strategies.rungs import create, merge_freely, no_merge, reach
 from coramp.strategies.situation import (
     RUNG_CREATE,
@@ -51,6 +53,10 @@ def first_that_helps(
             return plan_of(
                 fleet, proposal, situation, merge, RUNG_REACH, 0, conflict, rules
             ), proposal
+    if rules.road.lanes > 1 and conflict >= 0:
+        merge = make_way(fleet, proposal, situation, conflict, False, rules)
+        if merge.gap >= 0:
+            return plan_of_way(fleet, proposal, situation, merge, conflict, rules), proposal
     for scenario in (1, 2, 3):
         for gap in gaps:
             merge = create(fleet, proposal, situation, gap, scenario, rules)
@@ -90,6 +96,7 @@ class MainlinePriority:
     summary: ClassVar[str] = "the paper's method: the ramp vehicle picks, or is made, a gap"
     cooperative: ClassVar[bool] = True
     vehicles_may_differ: ClassVar[bool] = True
+    makes_way: ClassVar[bool] = True
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the ladder's answer for the first subject."""

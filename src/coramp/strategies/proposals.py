@@ -27,6 +27,7 @@ from coramp.vehicles.fleet import (
     Proposal,
     committed,
     entry_of,
+    leaves_lane_s,
     pair_margin_m,
     place_among,
     proposed,
@@ -34,6 +35,7 @@ from coramp.vehicles.fleet import (
 )
 from coramp.vehicles.merge_state import has_place_on_mainline
 from coramp.vehicles.trace import (
+    LEAVES_LANE,
     SHIFT_TOO_FAR,
     SHIFT_TOO_FAST,
     SHIFT_TOO_HARD,
@@ -83,6 +85,9 @@ def propose_shift(
         refuse(proposal.trace, TOO_MANY_MOVE, row, math.nan)
         return False
     start_s = max(window_start_s, fleet.merge_time_s[row])
+    if fleet.change_s[row] < math.inf:
+        refuse(proposal.trace, LEAVES_LANE, row, math.nan)
+        return False
     v0 = rules.road.mainline_speed_mps
     motion = rules.motion
     duration_s = window_end_s - start_s
@@ -212,13 +217,23 @@ def largest_safe_distance_m(rules: Rules) -> float:
 
 
 @kernel
+def miss_each_other(fleet: Fleet, one: int, other: int, last_merge_s: float, rules: Rules) -> bool:
+    """Returns whether one of two has left the outermost lane when the last of them comes to it."""
+    if rules.road.lanes == 1:
+        return False
+    leaves_s = min(leaves_lane_s(fleet, one), leaves_lane_s(fleet, other))
+    return bool(leaves_s < math.inf and last_merge_s >= leaves_s)
+
+
+@kernel
 def find_unsafe_pair(
     fleet: Fleet, proposal: Proposal, from_s: float, rules: Rules
 ) -> tuple[int, int]:
     """Returns rows of a changed vehicle and of one it would come too near, or (-1, -1).
 
     Every changed vehicle is compared with every live one, but for those whose ways along the
-    mainline stay so far apart that no safe distance reaches across.
+    mainline stay so far apart that no safe distance reaches across. Who is to leave the lane counts
+    as if it stayed, but for those that come onto it afterwards.
     """
     far_m = largest_safe_distance_m(rules)
     v0 = rules.road.mainline_speed_mps
@@ -236,6 +251,8 @@ def find_unsafe_pair(
             other_merge_s = fleet.merge_time_s[other_row]
             if other_entry >= 0:
                 other_merge_s = proposal.merge_time_s[other_entry]
+            if miss_each_other(fleet, row, other_row, max(one_merge_s, other_merge_s), rules):
+                continue
             if other_entry < 0 and min(one_merge_s, other_merge_s) <= from_s:
                 ahead_m = fleet.intercepts_m[other_row, 0] - fleet.length_m[other_row] - high_m
                 behind_m = low_m - fleet.length_m[row] - fleet.intercepts_m[other_row, 1]

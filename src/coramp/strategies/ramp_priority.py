@@ -1,7 +1,8 @@
 """Ramp priority (section V.B of the paper): the mainline opens a gap where the ramp vehicle merges.
 
 The ramp vehicle keeps its free movement. X moves ahead, Y back or both, whichever adjusts the
-fewest vehicles and then the least. Where no bound allows that: a later free movement, or a stop.
+fewest vehicles and then the least. Of several lanes, the vehicle in conflict makes way instead, if
+it can. Where no bound allows that: a later free movement, or a stop.
 """
 
 import math
@@ -14,6 +15,7 @@ from coramp.road.rules import Rules, unpacked
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.delays import come_later
 from coramp.strategies.ladder import decide_first, plan_of
+from coramp.strategies.make_way import make_way, plan_of_way
 from coramp.strategies.rungs import (
     Merge,
     merge_at,
@@ -130,6 +132,10 @@ def first_that_helps(
     if merge.gap >= 0:
         return plan_of(fleet, proposal, situation, merge, RUNG_FREE, 0, -1, rules), proposal
     conflict = conflict_position(fleet, situation, rules)
+    if rules.road.lanes > 1 and conflict >= 0:
+        merge = make_way(fleet, proposal, situation, conflict, True, rules)
+        if merge.gap >= 0:
+            return plan_of_way(fleet, proposal, situation, merge, conflict, rules), proposal
     merge = open_gap(fleet, proposal, situation, rules)
     if merge.gap >= 0:
         scenario = scenario_of(fleet, situation, merge.gap)
@@ -168,6 +174,7 @@ class RampPriority:
     summary: ClassVar[str] = "the paper's second method: the mainline opens a gap at the merge"
     cooperative: ClassVar[bool] = True
     vehicles_may_differ: ClassVar[bool] = True
+    makes_way: ClassVar[bool] = True
 
     def decide(self, view: View, memory: Memory) -> Decision:
         """Returns the answer for the first subject."""

@@ -148,11 +148,22 @@ def merge_freely(fleet: Fleet, proposal: Proposal, situation: Situation, rules: 
 def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rules: Rules) -> Merge:
     """Rung reach: an acceleration of Eq. 22 that puts the subject into a gap that is large enough.
 
+    ``reach_as`` says which one.
+    """
+    open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
+    return reach_as(fleet, proposal, situation, gap, RUNG_REACH, rules)
+
+
+@kernel
+def reach_as(
+    fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rung: int, rules: Rules
+) -> Merge:
+    """Reaches a gap for any rung, by an acceleration of Eq. 22, in the attempt under way.
+
     The one nearest to free movement's, or with ``gap_at_front`` that of Eq. 30. Where a vehicle
     before it on the acceleration lane is in the way, others within the gap are tried.
     """
     low_m, high_m = gap_bounds_m(fleet, situation, gap)
-    open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
     front_m = high_m
     low_m, high_m = max(low_m, situation.lowest_m), min(high_m, situation.highest_m)
     if low_m > high_m:
@@ -166,7 +177,7 @@ def reach(fleet: Fleet, proposal: Proposal, situation: Situation, gap: int, rule
     nearest_m = min(max(situation.free_m, low_m), high_m)
     for share in (0.0, 0.25, 0.5, 1.0):
         if share > 0.0:
-            open_in_gap(proposal.trace, RUNG_REACH, 0, situation.order, gap)
+            open_in_gap(proposal.trace, rung, 0, situation.order, gap)
         merge = merge_at(
             fleet,
             proposal,

@@ -20,11 +20,13 @@ from coramp.kinematics.trajectory import (
 from coramp.motion.approach import approach_without_stop
 from coramp.road.rules import Rules
 from coramp.strategies.ramp_queue import next_behind_on_ramp
-from coramp.vehicles.fleet import Fleet, committed
+from coramp.vehicles.fleet import Fleet, committed, leaves_lane_s
 from coramp.vehicles.merge_state import has_place_on_mainline, is_waiting
 
-RUNG_FREE, RUNG_REACH, RUNG_CREATE, RUNG_DELAY, RUNG_HOLD = range(5)
-RUNGS = ("free", "reach", "create", "delay", "hold")
+RUNG_FREE, RUNG_REACH, RUNG_CREATE, RUNG_DELAY, RUNG_HOLD, RUNG_MAKE_WAY = range(6)
+RUNGS = ("free", "reach", "create", "delay", "hold", "make way")
+RUNGS_OF_ONE_LANE = RUNGS[:RUNG_MAKE_WAY]
+"""Those with a column of their own, ``rung_*``; ``made_way`` counts the last one."""
 
 
 class Situation(NamedTuple):
@@ -99,13 +101,19 @@ def ramp_neighbours(fleet: Fleet, subject: int, from_s: float) -> tuple[bool, in
 
 
 @kernel
-def lane_order(fleet: Fleet, subject: int, v0_mps: float) -> tuple[IntArray, FloatArray]:
-    """Returns the rows that are or will be on the mainline, front first, and their intercepts."""
+def lane_order(
+    fleet: Fleet, subject: int, v0_mps: float, from_s: float = -math.inf
+) -> tuple[IntArray, FloatArray]:
+    """Returns the rows that are or will be on the mainline, front first, and their intercepts.
+
+    Who has left its lane by ``from_s`` for one further in is not among them.
+    """
     rows = np.empty(len(fleet.live), np.int64)
     intercepts_m = np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]):
+        stays = leaves_lane_s(fleet, row) > from_s
+        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]) and stays:
             value_m = cruise_intercept_m(committed(fleet, row), v0_mps)
             k = n
             while k > 0 and intercepts_m[k - 1] < value_m:
@@ -143,7 +151,8 @@ def assess(
     from_s = now_s + control.actuation_delay_s
     buffer = np.empty((MAX_PIECES, 4))
     n = approach_without_stop(committed(fleet, subject), from_s, road, motion, buffer)
-    order, intercepts_m = lane_order(fleet, subject, road.mainline_speed_mps)
+    v0, nose_s = road.mainline_speed_mps, buffer[n - 1, TIME]
+    order, intercepts_m = lane_order(fleet, subject, v0, nose_s)
     return situation_from(
         subject,
         from_s,

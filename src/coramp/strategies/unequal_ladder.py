@@ -11,6 +11,7 @@ import numpy as np
 
 from coramp._kernel import FloatArray, kernel
 from coramp.equations.gaps import least_acceleration_mps2
+from coramp.equations.safe_distance import merge_clearance_m
 from coramp.kinematics.trajectory import (
     MAX_PIECES,
     SPEED,
@@ -19,10 +20,12 @@ from coramp.kinematics.trajectory import (
 )
 from coramp.motion.approach import approach_without_stop, brake_and_go, late_approach, late_start
 from coramp.road.rules import Rules, unpacked
+from coramp.strategies.make_way import Asked, propose_change, way_further_in
 from coramp.strategies.situation import (
     RUNG_CREATE,
     RUNG_DELAY,
     RUNG_FREE,
+    RUNG_MAKE_WAY,
     RUNG_REACH,
     MergePlan,
     foremost_unknown_m,
@@ -32,9 +35,10 @@ from coramp.strategies.unequal_merge import (
     UnequalMerge,
     no_unequal_merge,
     try_merge,
+    way_to_merge,
 )
 from coramp.strategies.unequal_plan import hold_plan, unequal_plan
-from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal
+from coramp.vehicles.fleet import Fleet, Proposal, committed, empty_proposal, with_change
 from coramp.vehicles.trace import (
     CURRENT,
     MOVES_MORE,
@@ -45,7 +49,7 @@ from coramp.vehicles.trace import (
     open_attempt,
     refuse,
 )
-from coramp.vehicles.traits import LENGTH, able_mps2, cruise_mps, own_rules
+from coramp.vehicles.traits import LENGTH, able_mps2, cruise_mps, own_rules, pair_safety
 
 ACCELERATIONS = 7
 """How many accelerations are tried besides that of free movement."""
@@ -151,6 +155,62 @@ def rung_reach(fleet: Fleet, proposal: Proposal, subject: Subject, rules: Rules)
 
 
 @kernel
+def rung_make_way(
+    fleet: Fleet, proposal: Proposal, subject: Subject, free_alone: bool, rules: Rules
+) -> tuple[UnequalMerge, int]:
+    """The vehicle in conflict with free movement changes lanes; nobody else has to move.
+
+    With ``free_alone`` the subject keeps its free movement, else it is tried first. Returns who
+    makes way too, -1 for nobody.
+    """
+    row = nearest_at_merge(fleet, subject, rules)
+    if row < 0:
+        return no_unequal_merge(), -1
+    nose_s = subject.approach[len(subject.approach) - 1, TIME]
+    traits = fleet.traits[row]
+    clearance_m = merge_clearance_m(rules.road, pair_safety(traits, traits, rules.safety))
+    asked = Asked(row, -1, -1, subject.from_s, nose_s, subject.known_m, clearance_m)
+    way = np.empty((MAX_PIECES, 4))
+    n, change_s, _ = way_further_in(fleet, proposal, asked, rules, way)
+    if n == 0:
+        return no_unequal_merge(), -1
+    leaving = with_change(fleet, row, change_s)
+    for k in range(-1, 0 if free_alone else ACCELERATIONS):
+        accel_mps2 = subject.free_mps2 if k < 0 else subject.tried_mps2[k]
+        if k >= 0:
+            open_attempt(proposal.trace, RUNG_MAKE_WAY, 0, -1, -1)
+        merge = _try_by(leaving, proposal, subject, subject.approach, accel_mps2, False, rules)
+        if merge.done:
+            propose_change(fleet, proposal, row, way[:n], change_s)
+            return merge, row
+    return no_unequal_merge(), -1
+
+
+@kernel
+def nearest_at_merge(fleet: Fleet, subject: Subject, rules: Rules) -> int:
+    """Returns who on the mainline is nearest to the subject at the merge of free movement.
+
+    -1 where there is no such merge, or nobody.
+    """
+    out = np.empty((MAX_PIECES, 4))
+    m, merge_s, order, place = way_to_merge(
+        fleet, subject.row, subject.approach, subject.free_mps2, rules, out
+    )
+    if m == 0 or len(order) == 0:
+        return -1
+    merge_m, _ = station_and_speed(out[:m], merge_s)
+    nearest, nearest_m = -1, math.inf
+    for k in range(max(0, place - 1), min(len(order), place + 1)):
+        other = order[k]
+        other_m, _ = station_and_speed(committed(fleet, other), merge_s)
+        length_m = fleet.length_m[other] if other_m > merge_m else fleet.length_m[subject.row]
+        gap_m = abs(other_m - merge_m) - length_m
+        if gap_m < nearest_m:
+            nearest, nearest_m = other, gap_m
+    return int(nearest)
+
+
+@kernel
 def rung_create(
     fleet: Fleet, proposal: Proposal, subject: Subject, free_alone: bool, rules: Rules
 ) -> UnequalMerge:
@@ -250,6 +310,10 @@ def plan_unequal(
     rung, merge = RUNG_FREE, rung_free(fleet, proposal, subject, rules)
     if not merge.done and not ramp_first:
         rung, merge = RUNG_REACH, rung_reach(fleet, proposal, subject, rules)
+    made_way = -1
+    if not merge.done and rules.road.lanes > 1:
+        rung = RUNG_MAKE_WAY
+        merge, made_way = rung_make_way(fleet, proposal, subject, ramp_first, rules)
     if not merge.done:
         rung, merge = RUNG_CREATE, rung_create(fleet, proposal, subject, ramp_first, rules)
     if not merge.done:
@@ -260,7 +324,7 @@ def plan_unequal(
         return hold_plan(nose), proposal, blocked, behind
     front_length_m = fleet.traits[merge.front_row, LENGTH] if merge.front_row >= 0 else math.nan
     note_choice(proposal.trace, rung, 2 if merge.moved > 0 else 0, front_length_m)
-    plan = unequal_plan(fleet, proposal, row, now_s, nose, rung, merge, rules)
+    plan = unequal_plan(fleet, proposal, row, now_s, nose, rung, merge, made_way, rules)
     return plan, proposal, blocked, behind
 
 

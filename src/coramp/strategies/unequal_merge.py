@@ -32,6 +32,7 @@ from coramp.vehicles.fleet import (
     Proposal,
     committed,
     is_full,
+    leaves_lane_s,
     pair_margin_m,
     proposed,
 )
@@ -41,6 +42,7 @@ from coramp.vehicles.trace import (
     CANNOT_FALL_BACK,
     CANNOT_FOLLOW,
     HOLDS_UP_NEWCOMER,
+    LEAVES_LANE,
     NO_EASY_WAY,
     TOO_MANY_MOVE,
     note_gap,
@@ -81,11 +83,15 @@ def no_unequal_merge() -> UnequalMerge:
 
 @kernel
 def rows_on_mainline(fleet: Fleet, subject: int, at_s: float) -> IntArray:
-    """Returns the rows that are or will be on the mainline, front first, as they are at a time."""
+    """Returns the rows that are or will be on the mainline, front first, as they are at a time.
+
+    Who has left its lane by then for one further in is not among them.
+    """
     rows, behind_m = np.empty(len(fleet.live), np.int64), np.empty(len(fleet.live))
     n = 0
     for row in fleet.live:
-        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]):
+        stays = leaves_lane_s(fleet, row) > at_s
+        if row != subject and has_place_on_mainline(fleet.merge_time_s[row]) and stays:
             station_m, _ = station_and_speed(committed(fleet, row), at_s)
             rows[n], behind_m[n] = row, -station_m
             n += 1
@@ -266,8 +272,9 @@ def give_way(
             missing_m = rules.safety.execution_allowance_m - margin_m
             refuse_as_too_near(proposal.trace, -1, row, missing_m)
             return math.inf
-        if is_full(proposal):
-            refuse(proposal.trace, TOO_MANY_MOVE, row, math.nan)
+        if is_full(proposal) or fleet.change_s[row] < math.inf:
+            reason = TOO_MANY_MOVE if is_full(proposal) else LEAVES_LANE
+            refuse(proposal.trace, reason, row, math.nan)
             return math.inf
         out = proposal.pieces[entry + 1]
         count = follow_safely(

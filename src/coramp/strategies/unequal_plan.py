@@ -60,18 +60,23 @@ def unequal_plan(
     nose: FloatArray,
     rung: int,
     merge: UnequalMerge,
+    made_way: int,
     rules: Rules,
 ) -> MergePlan:
     """Returns the plan that a merge of ``row`` amounts to.
 
     The conflict vehicle is the nearer of the two around the merge. Severities are those between it
-    and ``row``, before and after the others adapt.
+    and ``row``, before and after the others adapt. Who ``made_way``, -1 for nobody, is the conflict
+    vehicle of its merge, and is on another lane then.
     """
     gap_m, needed_m, nearer_m = neighbour_distances_m(fleet, proposal, row, merge, rules)
     conflict = merge.front_row if nearer_m <= 0.0 else merge.rear_row
+    if made_way >= 0:
+        conflict = made_way
     before = after = (math.nan, math.nan)
     if conflict >= 0:
         before = _severity(fleet, row, committed(fleet, conflict), conflict, merge, rules)
+    if conflict >= 0 and made_way < 0:
         planned = trajectory_under(fleet, proposal, conflict)
         after = _severity(fleet, row, planned, conflict, merge, rules)
     return MergePlan(

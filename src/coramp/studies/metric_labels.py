@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-from coramp.strategies.situation import RUNGS
+from coramp.strategies.situation import RUNGS_OF_ONE_LANE
 from coramp.studies.speed_unit import MPS, SpeedUnit
 
 SPEED = "speed"
 """The unit of what is shown in the unit of speeds that was chosen."""
 POWERS = {"m/s2": "m/s²", "m/s3": "m/s³", "m2/s4": "m²/s⁴", "g)2": "g)²"}
-RUNG_COLUMNS = {rung: f"rung_{rung}" for rung in RUNGS}
+RUNG_COLUMNS = {rung: f"rung_{rung}" for rung in RUNGS_OF_ONE_LANE}
 """The columns that count the ramp vehicles of each rung."""
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from coramp._kernel import FloatArray, IntArray, kernel
 from coramp.equations.safe_distance import merge_distance_m, merging_speed_along_mps
 from coramp.kinematics.trajectory import MAX_PIECES, station_and_speed, time_at_station
+from coramp.road.lanes import LANE_CHANGE_LASTS_S
 from coramp.road.rules import Road, Rules, SafetyBudget
 from coramp.vehicles.merge_state import is_waiting
 from coramp.vehicles.separation import smallest_margin_m
@@ -22,6 +23,11 @@ class Fleet(NamedTuple):
     ``merge_time_s`` tells when a vehicle comes onto the mainline, as ``vehicles.merge_state`` reads
     it. ``traits`` are rows of ``vehicles.traits``. ``intercepts_m[i]`` bound ``station - v0 t``,
     below and above, over the trajectory.
+
+    Of several mainline lanes ``live`` has the vehicles of the ramp and of the outermost lane, and
+    ``inner`` those of the lanes further in. ``lane`` is the one by which a vehicle came, 0 for the
+    outermost and on the ramp. At ``change_s`` it begins to change to the next one (s; infinity for
+    never); until it has changed it is in both lists.
     """
 
     pieces: FloatArray
@@ -32,13 +38,17 @@ class Fleet(NamedTuple):
     intercepts_m: FloatArray
     traits: FloatArray
     live: IntArray
+    lane: IntArray
+    change_s: FloatArray
+    inner: IntArray
 
 
 class Proposal(NamedTuple):
     """New trajectories for some rows; ``size[0]`` of the entries are in use.
 
     The pieces start where the new trajectory takes over; what lies before stays as committed.
-    ``trace`` says what was tried for it (``vehicles.trace``).
+    ``lane_change_s`` is when they begin to change to the next lane further in (s; infinity for
+    never). ``trace`` says what was tried for it (``vehicles.trace``).
     """
 
     size: IntArray
@@ -46,6 +56,7 @@ class Proposal(NamedTuple):
     piece_count: IntArray
     pieces: FloatArray
     merge_time_s: FloatArray
+    lane_change_s: FloatArray
     trace: FloatArray
 
 
@@ -64,6 +75,7 @@ def empty_proposal(room: int = MAX_CHANGED) -> Proposal:
         np.empty(room, np.int64),
         np.empty((room, MAX_PIECES, 4)),
         np.empty(room),
+        np.full(room, math.inf),
         empty_trace(),
     )
 
@@ -118,6 +130,62 @@ def merge_time_under_s(fleet: Fleet, proposal: Proposal, row: int) -> float:
     if entry >= 0:
         return float(proposal.merge_time_s[entry])
     return float(fleet.merge_time_s[row])
+
+
+@kernel
+def with_change(fleet: Fleet, row: int, change_s: float) -> Fleet:
+    """Returns the fleet in which ``row`` begins to change to the next lane further in then (s)."""
+    changes_s = fleet.change_s.copy()
+    changes_s[row] = change_s
+    return Fleet(
+        fleet.pieces,
+        fleet.first_piece,
+        fleet.piece_count,
+        fleet.length_m,
+        fleet.merge_time_s,
+        fleet.intercepts_m,
+        fleet.traits,
+        fleet.live,
+        fleet.lane,
+        changes_s,
+        fleet.inner,
+    )
+
+
+@kernel
+def in_lane(fleet: Fleet, lane: int) -> Fleet:
+    """Returns the fleet with those alone as live who are on one lane further in, or change to it.
+
+    Who changes counts on both lanes.
+    """
+    rows, count = np.empty(len(fleet.inner), np.int64), 0
+    for row in fleet.inner:
+        changed = 1 if fleet.change_s[row] < math.inf else 0
+        if fleet.lane[row] == lane or fleet.lane[row] + changed == lane:
+            rows[count] = row
+            count += 1
+    return Fleet(
+        fleet.pieces,
+        fleet.first_piece,
+        fleet.piece_count,
+        fleet.length_m,
+        fleet.merge_time_s,
+        fleet.intercepts_m,
+        fleet.traits,
+        rows[:count],
+        fleet.lane,
+        fleet.change_s,
+        fleet.inner,
+    )
+
+
+@kernel
+def leaves_lane_s(fleet: Fleet, row: int) -> float:
+    """Returns when (s) a vehicle has left its lane for the next one further in, infinity for never.
+
+    It counts on both lanes until then.
+    """
+    return float(fleet.change_s[row] + LANE_CHANGE_LASTS_S)
 
 
 class PairSafety(NamedTuple):

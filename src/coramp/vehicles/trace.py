@@ -35,9 +35,10 @@ from coramp._kernel import FloatArray, IntArray, kernel
 """Columns of an attempt, and how many there are. Rows of vehicles are -1, numbers nan for none.
 
 REASON is one of those below. OTHER is the vehicle that is in the way or cannot do its part, MOVED
-one that would be moved, where that and not the subject comes too near to OTHER. MISSING is by how
-much (m) it fails. INTERCEPT is station - v0 t (m) once the subject cruises. AHEAD and BACK are by
-how much (m) the vehicles before and behind the gap move for it, from MOVES_FROM_S on.
+one that would be moved, where that and not the subject comes too near to OTHER, or the one that
+makes way. MISSING is by how much (m) it fails. INTERCEPT is station - v0 t (m) once the subject
+cruises. AHEAD and BACK are by how much (m) the vehicles before and behind the gap move for it, from
+MOVES_FROM_S on.
 """
 COUNT, CURRENT, FREE_ACCEL, OWN_LENGTH, CLEARANCE = range(5)
 """Columns of row 0: how many attempts there were, the row of the one under way, and what holds for
@@ -68,7 +69,12 @@ ROOM = 512
     NO_EASY_WAY,
     CANNOT_FOLLOW,
     LEADER_WAITS,
-) = range(21)
+    LEAVES_LANE,
+    NOT_ON_MAINLINE,
+    CHANGE_TOO_LATE,
+    HOLDS_UP_FURTHER_IN,
+    NO_GAP_FURTHER_IN,
+) = range(26)
 """Why an attempt failed; CHOSEN is the one that did not."""
 
 
@@ -118,6 +124,12 @@ def accept(trace: FloatArray) -> None:
 def refuse_as_too_near(trace: FloatArray, moved: int, other: int, missing_m: float) -> None:
     """Says that the subject, or a vehicle that is moved (else -1), comes too near to another."""
     refuse(trace, TOO_NEAR, other, missing_m)
+    trace[int(trace[0, CURRENT]), MOVED] = moved
+
+
+@kernel
+def note_moved(trace: FloatArray, moved: int) -> None:
+    """Says who makes way for the attempt under way."""
     trace[int(trace[0, CURRENT]), MOVED] = moved
 
 

@@ -11,7 +11,7 @@ from coramp.coordination.driven import driven_pieces
 from coramp.coordination.plant import Arrival
 from coramp.messages.events import columns_of
 from coramp.motion.lane_change import lane_change_s
-from coramp.records.lanes import planned_history
+from coramp.records.lanes import planned_history, with_lanes_further_in
 from coramp.records.outcome import Outcome, Passages, Pieces, until_s
 from coramp.scenarios.model import Scenario
 
@@ -54,12 +54,14 @@ def cooperative_outcome(
     ledger, end_s = coordinator.ledger, end_step * step_s
     vehicle_of_row, entry_step = coordinator.entered()
     entry_s, merge_s, exit_s, error_m = (np.full(len(arrivals), np.nan) for _ in range(4))
+    change_s = np.full(len(arrivals), np.inf)
     entry_s[vehicle_of_row] = entry_step * step_s
     merge_s[vehicle_of_row] = ledger.book.merge_time_s[: len(ledger)]
     if driven is not None:
         merge_s = lane_change_s(merge_s, step_s)
     exit_s[vehicle_of_row] = ledger.book.exit_s[: len(ledger)]
     error_m[vehicle_of_row] = plan_error_m
+    change_s[vehicle_of_row] = ledger.book.change_s[: len(ledger)]
     merge_s[merge_s > end_s] = np.nan
     exit_s[exit_s > end_s] = np.nan
     first, lane, rows = driven_pieces(ledger, vehicle_of_row, len(arrivals), end_s)
@@ -72,7 +74,9 @@ def cooperative_outcome(
         pieces=planned,
         lane=lane,
         driven=driven or planned,
-        lanes=planned_history(passages.on_ramp, entry_s, merge_s, left_s),
+        lanes=with_lanes_further_in(
+            planned_history(passages.on_ramp, entry_s, merge_s, left_s), passages.lane, change_s
+        ),
         end_s=end_s,
         collisions=collisions,
         decisions=tuple(coordinator.decisions),

@@ -111,8 +111,12 @@ class CooperativePlant:
             arrival.speed_mps,
         )
 
-    def follow(self, row: int, pieces: FloatArray, merge_time_s: float) -> None:
+    def follow(
+        self, row: int, pieces: FloatArray, merge_time_s: float, lane_change_s: float = math.inf
+    ) -> None:
         """Makes a vehicle follow the pieces from their first time on."""
+        if lane_change_s < math.inf:
+            raise ValueError("plans change lanes on the mainline in the exact engine alone")
         vehicle = self.vehicles[row]
         exit_s = time_at_station(pieces, self._exit_m - BEFORE_EXIT_M)
         last = math.inf
