@@ -8,7 +8,6 @@ from coramp._kernel import BoolArray, FloatArray
 from coramp.demand.arrivals import kinds_of
 from coramp.demand.generators import generator
 from coramp.road.streams import STREAMS
-from coramp.scenarios.demand_sections import MAINLINE, RAMP
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import ExplicitArrival, Vehicle
 
@@ -58,7 +57,7 @@ def arrivals_by_counts(
                 last = max(last + 1, int(time_s / step_s))
                 kind, top_mps = next(kinds)
                 yield ExplicitArrival(
-                    stream=RAMP if on_ramp else MAINLINE,
+                    stream="ramp" if on_ramp else "mainline",
                     time_s=last * step_s,
                     speed_mps=speed_mps,
                     type=kind,
