@@ -208,7 +208,12 @@ def named():
     return [
         Hidden("credible", credible, flows, 1),
         Hidden("credible-b", credible, Flows(1500.0, 200.0, 1200.0), 7),
-        Hidden("slow", drivers_of("krauss", 1.5, 1.2, (0.9, 0.05), sigma=0.6), flows, 2),
+        Hidden(
+            "slow",
+            drivers_of("krauss", 1.5, 1.2, (0.9, 0.05), sigma=0.6),
+            Flows(1000.0, 150.0, 1200.0),
+            2,
+        ),
         Hidden(
             "close",
             drivers_of("krauss", 0.9, 2.2, (1.05, 0.1), sigma=0.3, min_gap_m=2.0),

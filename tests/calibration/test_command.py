@@ -4,6 +4,7 @@ import hashlib
 import json
 import tomllib
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -12,6 +13,8 @@ from coramp.calibration.effort import Effort
 from coramp.calibration.fit import Fit
 from coramp.calibration.free_speed import FreeSpeed
 from coramp.calibration.from_files import Asked, calibrated
+from coramp.calibration.models import AXES, usual_population
+from coramp.calibration.search import Axis
 from coramp.calibration.series import capacity_veh_h, series_of
 from coramp.calibration.written import write_population
 from coramp.cli.calibration_listing import calibrated_table
@@ -44,7 +47,7 @@ road = "ramp"
 station_m = -380.0
 """
 FACTOR = SpeedFactor(mean=0.95, deviation=0.04, low=0.87, high=1.03)
-HIDDEN = DriverPopulation(wish="free-flow", tau_s=1.5, accel_mps2=1.4, speed_factor=FACTOR)
+HIDDEN = DriverPopulation(wish="free-flow", tau_s=1.5, speed_factor=FACTOR)
 FREE_MPS = 19.0
 
 
@@ -70,28 +73,44 @@ def told_by(road, flows, horizon_s, drivers=HIDDEN, seed=5):
     return detected(scenario, drivers, seed)
 
 
-def broken_down(road):
-    """Data whose merge breaks down after some 15 min."""
-    return told_by(road, ((1200.0, 1700.0), (100.0, 1200.0)), 2700.0)
+RISING = ((900.0, 1700.0), (100.0, 1400.0)), 2400.0
+"""Flows under which the merge of the hidden drivers breaks down after some 15 min."""
 
 
-def test_hidden_drivers_are_found_roughly_by_few_runs(road, tmp_path):
+def capacity_of(road, drivers):
+    """Mean over seeds, of which no data was made, of the highest flow of 5 min before."""
+    told = [told_by(road, *RISING, drivers, seed) for seed in (11, 12)]
+    found = [capacity_veh_h(series_of(frame), "M2", "M3", FREE_MPS) for frame in told]
+    assert None not in found
+    return np.mean(found)
+
+
+def test_a_hidden_time_gap_is_found_by_few_runs(road, tmp_path, monkeypatch):
+    """Only it and desired speeds are unknown here; benchmarks/hidden_populations.py hides all."""
+    monkeypatch.setitem(AXES, "krauss", (Axis("tau_s", 0.5, 2.0),))
     counts = tmp_path / "counts.csv"
-    frame = broken_down(road)
+    frame = told_by(road, *RISING)
     frame.write_csv(counts)
     measured = capacity_veh_h(series_of(frame), "M2", "M3", FREE_MPS)
     assert measured is not None
     told = []
-    effort = Effort(16, 4, 2, speed_runs=4, fit_runs=2)
+    effort = Effort(12, 6, 2, speed_runs=3, fit_runs=1)
     effort = effort.told_to(lambda *done: told.append(done))
     found, origin = calibrated(str(road), counts, Asked(date="2026-01-02"), effort)
-    assert told[-1] == (34, 34)
+    assert told[-1] == (25, 25)
     assert found.notes == ()
-    assert found.drivers.speed_factor.mean == pytest.approx(0.95, rel=0.03)
+    assert found.drivers.tau_s == pytest.approx(1.5, abs=0.08)
+    assert found.drivers.speed_factor.mean == pytest.approx(0.95, rel=0.01)
     assert found.fit.capacity_veh_h[0] == measured
-    assert found.fit.runs == 2
-    assert found.fit.good_geh_share > 0.8
-    assert 1.1 < found.drivers.tau_s < 1.9
+    assert found.fit.runs == found.fit.broke_down == 1
+    assert found.fit.good_geh_share > 0.95
+    assert found.fit.speed_rmse_mps < 1.0
+    hidden_veh_h, found_veh_h = (capacity_of(road, one) for one in (HIDDEN, found.drivers))
+    assert found_veh_h == pytest.approx(hidden_veh_h, rel=0.03)
+    # None of this is so by accident: SUMO's own drivers carry a quarter more.
+    usual = usual_population("krauss", found.drivers.speed_factor)
+    carried = series_of(told_by(road, *RISING, usual, 11)).coarse().flow_veh_h("M3").max()
+    assert carried > 1.25 * hidden_veh_h
     out = tmp_path / "found.toml"
     write_population(found, out, origin)
     written = tomllib.loads(out.read_text())

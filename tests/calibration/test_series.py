@@ -107,6 +107,8 @@ def test_capacity_is_the_highest_flow_before():
 
 def test_moments_of_a_breakdown():
     found = dict(zip(names_of_moments(SITE), moments_of(BROKEN, SITE, 20.0), strict=True))
+    speeds = {name.split()[2] for name in found if name.startswith("speed")}
+    assert speeds == {"up", "down"}  # where vehicles have just entered they tell little of drivers
     assert found["breakdown time (s)"] == 1800.0
     assert found["highest flow before (veh/h)"] == 144.0
     assert found["highest flow of 10 min before (veh/h)"] == (12 + 11) / 2 * 12.0

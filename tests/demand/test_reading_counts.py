@@ -214,6 +214,16 @@ def test_what_does_not_add_up_is_told_by_row(file, place, row, line):
     assert told(file(table(*replaced(place, row)))) == [line]
 
 
+def test_within_a_minute_a_platoon_may_pass(file):
+    assert read_counts(file(table("0,60,M,0,car,60,24"))).interval_s == 60.0
+    assert told(file(table("0,60,M,0,car,61,24"))) == [
+        (
+            "row 2: 61 vehicles in 60 s are 3660 veh/h; allowed are up to 3600 veh/h a lane; "
+            "counts per hour belong into flow_veh_h"
+        )
+    ]
+
+
 def test_a_gap_of_the_whole_file(file):
     rows = [row for row in ROWS if not row.startswith("300")]
     assert told(file(table(*rows))) == [

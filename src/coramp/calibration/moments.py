@@ -11,7 +11,8 @@ LONGER_S = 600.0
 OBJECTIVE = (
     "sum of squares of measured minus simulated over the simulation's noise: breakdown time, "
     "highest 5-minute and 10-minute flow before, flow that comes in the 10 minutes before, "
-    "discharge and the ramp's share of it, mean speed at each detector before and after"
+    "discharge and the ramp's share of it, mean speed before and "
+    "after at each detector but the first of each road"
 )
 
 
@@ -24,8 +25,8 @@ def names_of_moments(site: Site) -> list[str]:
         "flow that comes in the 10 min before (veh/h)",
         "discharge (veh/h)",
         "ramp's share of the discharge",
-        *(f"speed at {loop.id} before (m/s)" for loop in site.loops),
-        *(f"speed at {loop.id} after (m/s)" for loop in site.loops),
+        *(f"speed at {loop.id} before (m/s)" for loop in site.settled),
+        *(f"speed at {loop.id} after (m/s)" for loop in site.settled),
     ]
 
 
@@ -35,7 +36,8 @@ def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
     When the merge broke down, the end where it did not; the highest flow of 5 min before, that of
     any 10 min before, and the flow that came to the merge in the last 10 min before; the mean flow
     from the first full interval of the queue on, and the share of it that came by the ramp; then at
-    each detector the mean speed of vehicles before the breakdown, and from it on.
+    each detector but the first of each road the mean speed of vehicles before the breakdown, and
+    from it on.
     """
     coarse = series.coarse()
     start = breakdown_of(coarse, site.upstream.id, free_mps)
@@ -56,8 +58,8 @@ def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
             *_flows_before(series.between(series.begin_s, onset), site),
             flow_veh_h[after].mean() if after.any() else np.nan,
             ramp[after].sum() / both[after].sum() if after.any() and both[after].sum() else np.nan,
-            *(_speed_mps(coarse, loop.id, before) for loop in site.loops),
-            *(_speed_mps(coarse, loop.id, after) for loop in site.loops),
+            *(_speed_mps(coarse, loop.id, before) for loop in site.settled),
+            *(_speed_mps(coarse, loop.id, after) for loop in site.settled),
         ]
     )
 

@@ -22,6 +22,15 @@ class Site:
     upstream: Detector
     downstream: Detector
 
+    @property
+    def settled(self) -> tuple[Detector, ...]:
+        """The detectors whose speeds tell of drivers: not those where vehicles have just entered.
+
+        That at which a queue is seen counts in any case.
+        """
+        entries = self.mainline_entry, self.ramp_entry
+        return tuple(loop for loop in self.loops if loop == self.upstream or loop not in entries)
+
 
 def site_of(loops: Sequence[Detector], acceleration_lane_m: float) -> Site:
     """Returns what detectors of a merge are for.

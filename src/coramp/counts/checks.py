@@ -9,6 +9,8 @@ from coramp.counts.table import LONGEST_S, SHORTEST_S, Findings, Line
 
 CAPACITY_VEH_H = 2600.0
 """More than so many vehicles an hour no lane carries."""
+PLATOON_VEH_H, PLATOON_S = 3600.0, 300.0
+"""Within less than 5 min a lane may carry more: platoons at headways of 1 s."""
 MOST_LANES = 6
 """So many lanes a detector may have whose counts name none."""
 FASTEST_MPS = 55.0
@@ -144,12 +146,13 @@ def _capacity(lines: list[Line], findings: Findings, lanes: int | None) -> list[
         length_s = first.end_s - first.begin_s
         count = sum(line.vehicles for line in here)
         many = 1 if first.lane is not None else lanes or MOST_LANES
-        if count * HOUR_S <= many * CAPACITY_VEH_H * max(length_s, SHORTEST_S):
+        most_veh_h = many * (PLATOON_VEH_H if length_s < PLATOON_S - SAME_S else CAPACITY_VEH_H)
+        if count * HOUR_S <= most_veh_h * max(length_s, SHORTEST_S):
             continue
         row = max(here, key=lambda line: line.vehicles).row
         per = "a lane" if many == 1 else f"on {many} lanes"
         what = f"{count:g} vehicles in {length_s:g} s are {count * HOUR_S / length_s:g} veh/h"
-        allowed = f"are up to {many * CAPACITY_VEH_H:g} veh/h {per}"
+        allowed = f"are up to {most_veh_h:g} veh/h {per}"
         allowed += "; counts per hour belong into flow_veh_h" if _per_hour(here, many) else ""
         findings.tell(row, what, allowed)
     return lines
