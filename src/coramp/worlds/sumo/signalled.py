@@ -22,6 +22,7 @@ from coramp.worlds.sumo.network import JUNCTION_LENGTH_M
 Point = tuple[float, ...]
 SHORTEST_M = 1.0
 """What must be left of an edge on both sides of a stop line."""
+GZIP = b"\x1f\x8b"
 
 
 class StopLine(NamedTuple):
@@ -48,7 +49,7 @@ def signalled_network(file: Path, _sha256: str, lines: tuple[StopLine, ...]) -> 
     The hash is that of the file: a changed one is cut anew.
     """
     content = file.read_bytes()
-    root = ET.fromstring(gzip.decompress(content) if file.suffix == ".gz" else content)
+    root = ET.fromstring(gzip.decompress(content) if content.startswith(GZIP) else content)
     for line in lines:
         add_signal(root, line)
     folder = Path(tempfile.mkdtemp(prefix="coramp-net-"))
