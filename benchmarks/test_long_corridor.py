@@ -19,8 +19,8 @@ def test_long_corridor_against_plain_sumo(benchmark, tmp_path):
     ratio = row["cpu_s"] / row["plain"]["cpu_s"]
     print(
         f"\n10 km, 5 ramps, 100 % automated, {row['vehicles']} vehicles: {row['cpu_s']:.1f} s, "
-        f"plain sumo {row['plain']['cpu_s']:.1f} s, ratio {ratio:.2f} (aim {AIM}, at most {AT_MOST}); "
-        f"{row['memory_mb']:.0f} MB"
+        f"plain sumo {row['plain']['cpu_s']:.1f} s, ratio {ratio:.2f} (aim {AIM}, at most "
+        f"{AT_MOST}); {row['memory_mb']:.0f} MB"
     )
     assert row["unserved"] == row["collisions_by_automated"] == 0
     assert ratio <= AT_MOST
