@@ -136,8 +136,7 @@ class Watched(corridor.Session):
 def _without(options):
     """Options of SUMO without those that name what it writes."""
     pairs = zip(options[::2], options[1::2], strict=True)
-    outputs = tuple(f"{name}" for name in WRITES)
-    return [part for pair in pairs if not pair[0].startswith(outputs) for part in pair]
+    return [part for pair in pairs if not pair[0].startswith(WRITES) for part in pair]
 
 
 def measured(scenario, case, vehicles, folder):

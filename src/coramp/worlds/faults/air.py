@@ -58,19 +58,21 @@ class Air:
     _overdue: BoolArray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Each fault draws from random numbers of its own."""
+        """Each fault draws from random numbers of its own; in a perfect world there is none."""
         scenario, count = self.scenario, len(self.reporting)
+        self._command, self._overdue = np.full((count, 4), np.nan), np.zeros(count, np.bool_)
         tables = (scenario.positioning, scenario.clock, scenario.reports, scenario.commands)
         self.is_perfect = scenario.behaviour.is_perfect and all(t.is_perfect for t in tables)
         self._all_report = bool(self.reporting.all())
+        if self.is_perfect:  # nothing of a vehicle but its last command is kept
+            count = 0
         self._reports = LossyLink(scenario.reports, count, self._random_of("reports"))
         self._commands = LossyLink(scenario.commands, count, self._random_of("commands"))
         positioning = self._random_of("positioning")
         self._positions = WrongPositions(scenario.positioning, count, positioning)
         self._clocks = WrongClocks(scenario.clock, count, self._of_vehicles("clock"))
-        self._known, self._command = np.full((count, 6), np.nan), np.full((count, 4), np.nan)
-        self._reported_s, self._overdue = np.full(count, -np.inf), np.zeros(count, np.bool_)
-        self._draw_characters(count)
+        self._known, self._reported_s = np.full((count, 6), np.nan), np.full(count, -np.inf)
+        self._draw_characters(self.automated[:count])
 
     def _random_of(self, table: str) -> Callable[[str], np.random.Generator]:
         return partial(_random_of, self.seed, table)
@@ -79,8 +81,9 @@ class Air:
         seed = self.seed if self.vehicles_seed is None else self.vehicles_seed
         return partial(_random_of, seed, table)
 
-    def _draw_characters(self, count: int) -> None:
+    def _draw_characters(self, automated: BoolArray) -> None:
         """Who falls silent when, who lies, who disobeys: automated vehicles alone."""
+        count = len(automated)
         behaviour, horizon_s = self.scenario.behaviour, self.scenario.simulation.horizon_s
         random_of = self._of_vehicles("behaviour")
         (silent, since), lies, disobeys = (
@@ -88,11 +91,11 @@ class Air:
             random_of("lies").random(count),
             random_of("disobeys").random(count),
         )
-        chosen = self.automated & (silent < behaviour.silent_share)
+        chosen = automated & (silent < behaviour.silent_share)
         self._silent_from_s = np.where(chosen, since * horizon_s, np.inf)
         lies_m = np.where(lies < behaviour.lies_share, behaviour.lie_m, 0.0)
-        self._lie_m = np.where(self.automated, lies_m, 0.0)
-        self._disobeys = self.automated & (disobeys < behaviour.disobeys_share)
+        self._lie_m = np.where(automated, lies_m, 0.0)
+        self._disobeys = automated & (disobeys < behaviour.disobeys_share)
 
     def heard(self, now_s: float, users: RoadUsers) -> RoadUsers:
         """Returns what the coordinator knows of who is on the road now."""
@@ -131,33 +134,27 @@ class Air:
 
     def _carried_on(self, now_s: float, users: RoadUsers) -> RoadUsers:
         """The last reports, carried on from their stamps; those that are stale are forgotten."""
-        known, end_m = self._known, self.scenario.mainline.end_m
+        order = np.argsort(users.number)  # who has left says so to the road's own detectors
+        number, end_m = users.number[order], self.scenario.mainline.end_m
+        known = self._known[number]
         age_s = np.clip(now_s - known[:, STAMP], 0.0, None)
         way_m, speed_mps = onwards(known[:, SPEED], known[:, ACCEL], age_s)
         station_m = known[:, STATION] + way_m
         fresh = (age_s <= self.scenario.reports.stale_s) & (station_m < end_m + BEYOND_M)
-        number = np.flatnonzero(fresh)
-        place = self._place_of(users)
-        number = number[place[number] >= 0]  # who has left says so to the road's own detectors
-        there = place[number]
+        there = order[fresh]
         return users._replace(
-            number=number,
-            station_m=station_m[number],
-            speed_mps=speed_mps[number],
-            accel_mps2=known[number, ACCEL],
+            number=number[fresh],
+            station_m=station_m[fresh],
+            speed_mps=speed_mps[fresh],
+            accel_mps2=known[fresh, ACCEL],
             length_m=users.length_m[there],
-            on_mainline=known[number, ON_MAINLINE] > 0.5,
+            on_mainline=known[fresh, ON_MAINLINE] > 0.5,
             automated=users.automated[there],
             cruise_mps=users.cruise_mps[there],
             acceleration_mps2=users.acceleration_mps2[there],
             power_wpkg=users.power_wpkg[there],
             braking_mps2=users.braking_mps2[there],
         )
-
-    def _place_of(self, users: RoadUsers) -> IntArray:
-        place = np.full(len(self.reporting), -1)
-        place[users.number] = np.arange(len(users.number))
-        return place
 
     def tell(self, now_s: float, seen: RoadUsers, steering: Steering) -> None:
         """Sends to each automated vehicle how much it may speed up and whether it may merge."""
@@ -235,6 +232,8 @@ class Air:
 
     def faults(self, entry_s: FloatArray, until_s: FloatArray) -> list[tuple[float, str, int]]:
         """Returns which vehicles failed while they were on the road: time (s), what, number."""
+        if self.is_perfect:
+            return []
         silent_s = np.maximum(self._silent_from_s, entry_s)
         found = [(now_s, "positioning fails", n) for now_s, n in self._positions.outages]
         for what, from_s, chosen in (
