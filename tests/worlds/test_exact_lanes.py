@@ -6,6 +6,7 @@ import pytest
 import coramp
 from coramp.audit.audit import audit
 from coramp.explain.story import story_of
+from coramp.report.story_scene import CONFLICT, MOVED, scene_of
 
 THREE = {"mainline.lanes": 3, "mainline.lane_shares": [0.5, 0.25, 0.25]}
 
@@ -76,6 +77,18 @@ def test_the_story_tells_who_makes_way(made, folder):
     who = decision["conflict_vehicle_id"]
     assert chapter.text.startswith(f"{who} makes way to the lane further in: it merges")
     assert any(f"{who} makes way" in line and "chosen" in line for line in chapter.tried)
+
+
+def test_the_picture_of_a_decision_leaves_out_who_is_further_in(made):
+    decision = made.decisions.filter(rung="make way").row(0, named=True)
+    scene = scene_of(made, decision["vehicle_id"])
+    who = decision["conflict_vehicle_id"]
+    assert {MOVED, CONFLICT} <= set(scene.roles[who])
+    changes_s = made.trajectories.filter(vehicle_id=who, lane="mainline 2")["time_s"][0]
+    assert scene.driven[who].until_s == pytest.approx(changes_s + 4.5)
+    came = made.trajectories.group_by("vehicle_id", maintain_order=True).first()
+    outer = came.filter(pl.col("lane").is_in(["mainline", "ramp"]))["vehicle_id"].to_list()
+    assert set(scene.driven) == set(outer)
 
 
 @pytest.mark.parametrize(

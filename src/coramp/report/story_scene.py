@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from coramp.kinematics.trajectory import TIME, station_and_speed
 from coramp.records.run import RunRecords, moved_for
 from coramp.records.schemas import Row
 from coramp.report.plan_figure import COLUMNS
-from coramp.road.lanes import mainline_lane
+from coramp.road.lanes import LANE_CHANGE_LASTS_S, mainline_lane
 from coramp.scenarios.model import Scenario
 from coramp.vehicles.merge_state import BY_MAINLINE_S, NOT_PLANNED_S, is_on_mainline
 
@@ -123,6 +123,11 @@ def scene_of(run: RunRecords, vehicle_id: str) -> Scene:
     driven = driven_of(trajectories, run.vehicles)
     if vehicle_id not in driven:
         raise CorampError(f"{vehicle_id} never entered; there is nothing to plot of it")
+    driven = beside_ramp(driven, trajectories)
+    if vehicle_id not in driven:
+        raise CorampError(
+            f"{vehicle_id} came by a lane further in; the picture is of the lane next to the ramp"
+        )
     decision = _decision_of(decisions, vehicle_id)
     if decision is None:
         return _passage(run, vehicle_id, driven)
@@ -154,6 +159,20 @@ def driven_of(trajectories: pl.DataFrame, vehicles: pl.DataFrame) -> dict[str, D
     return found
 
 
+def beside_ramp(driven: Mapping[str, Driven], trajectories: pl.DataFrame) -> dict[str, Driven]:
+    """Returns what vehicles drove as long as they were on the ramp or the lane next to it."""
+    inner = [name for name in trajectories["lane"].unique() if mainline_lane(name) > 0]
+    further_in = trajectories.filter(pl.col("lane").is_in(inner))
+    left_s = dict(further_in.group_by("vehicle_id").agg(pl.col("time_s").min()).iter_rows())
+    found = {}
+    for name, own in driven.items():
+        changes_s = left_s.get(name, math.inf)
+        if changes_s > own.from_s:
+            until_s = min(own.until_s, changes_s + LANE_CHANGE_LASTS_S)
+            found[name] = replace(own, until_s=until_s)
+    return found
+
+
 def _merge_s(pieces: pl.DataFrame) -> float:
     on_mainline = [mainline_lane(name) >= 0 for name in pieces["lane"]]
     if not any(on_mainline):
@@ -171,7 +190,7 @@ def _decision_of(decisions: pl.DataFrame, vehicle_id: str) -> Row | None:
 
 def _roles(decision: Row) -> dict[str, tuple[str, ...]]:
     """What each vehicle of a decision is; a vehicle can be several things at once."""
-    aside = MOVED if decision["rung"] == "create" else BRAKED
+    aside = MOVED if decision["rung"] in ("create", "make way") else BRAKED
     parts = [
         (decision["vehicle_id"], SUBJECT),
         (decision["front_vehicle_id"], FRONT),

@@ -23,10 +23,11 @@ def demand_above_limit(spec: RunSpec) -> str | None:
 def _above_limit(spec: RunSpec) -> str | None:
     """How many arrive and how many the lane carries, None where these are no fewer.
 
-    Arrivals that are listed one by one have no flow. Of flows that change the most counts.
+    Arrivals that are listed one by one have no flow. Of flows that change the most counts. On
+    several lanes it depends on who makes way.
     """
     scenario = spec.scenario
-    if spec.drivers is not None or scenario.arrivals:
+    if spec.drivers is not None or scenario.arrivals or scenario.mainline.lanes > 1:
         return None
     streams = (scenario.mainline.flows_veh_h, scenario.ramp.flows_veh_h)
     demand_veh_h = max(map(sum, zip(*streams, strict=True)))
