@@ -387,9 +387,8 @@ PROMISES = (
     _fault(
         "SUMO moves automated vehicles off the mainline",
         PLANT,
-        "            if users.on_mainline[i]:\n                self.session.take_over(names[i])",
-        "            if users.on_mainline[i]:\n"
-        "                self.session.take_over_among_drivers(names[i])",
+        "        if on_mainline:\n            self.session.take_over(name)",
+        "        if on_mainline:\n            self.session.take_over_among_drivers(name)",
         f"{OF_RUNS}::test_no_automated_vehicle_leaves_the_mainline",
     ),
 )

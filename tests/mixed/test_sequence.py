@@ -219,9 +219,10 @@ def test_who_is_beside_one_that_stands_does_not_wait_for_it_to_merge_ahead(at_m,
     """R stands at the lane's end, its tail at 192 m: nobody there could fall in behind it."""
     stands = (197.0, 0.0, False, True)
     assert math.isinf(room([(at_m, speed_mps, True, True), stands])[0])
-    assert room([(190.0, speed_mps, True, True), stands])[0] <= 0.0
-    assert room([(at_m, speed_mps, True, True), (197.0, 1.0, False, True)])[0] <= 0.0
-    assert room([(at_m, 4.0, True, True), stands])[0] <= 0.0
+    assert room([(190.0, speed_mps, True, True), stands])[0] <= 0.0  # 2 m behind it: it waits
+    moves, faster = (197.0, 1.0, False, True), (191.6, 4.0, True, True)
+    assert np.isfinite(room([(191.6, speed_mps, True, True), moves])[0])
+    assert np.isfinite(room([faster, stands])[0])
 
 
 def test_nobody_slows_below_a_share_of_the_lanes_speed():

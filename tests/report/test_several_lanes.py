@@ -98,8 +98,8 @@ def test_a_replay_draws_each_lane_apart(run, tmp_path):
 @in_browser
 def test_a_diagram_begins_where_a_ramp_longer_than_the_mainline_does(tmp_path):
     folder = tmp_path / "r"
-    longer = ("--set", "ramp.start_m=-900.0", "--strategy", "uncontrolled", "--horizon", 10)
-    assert invoke("run", "paper", *longer, "--out", folder).code == 0
+    half = ("--strategy", "mixed-slots", "--set", "traffic.automated_share=0.5", "--horizon", 10)
+    assert invoke("run", "paper", "--set", "ramp.start_m=-900.0", *half, "--out", folder).code == 0
     assert invoke("report", folder).code == 0
     path = folder / "report.html"
     with chromium() as browser, opened(browser, f"file://{path}") as page:
