@@ -7,7 +7,7 @@ from contextlib import closing
 import gymnasium
 import pytest
 
-import coramp
+import coramp.gym
 from coramp.errors import CorampError
 from coramp.records.run_folder import read_run
 from coramp.report.page.asked import asked_table
