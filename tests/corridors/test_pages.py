@@ -42,6 +42,13 @@ def positions(runs):
     return pl.read_parquet(runs[0] / "sumo" / "fcd.parquet").drop_nulls("vehicle_id")
 
 
+def test_a_run_has_the_same_figures_whether_positions_are_kept_or_not(runs):
+    kept = read_corridor(runs[0])
+    again = coramp.corridor(str(runs[0].parent / "road.toml"))
+    assert again.summary == kept.summary
+    assert all(frame.equals(kept.frames[name]) for name, frame in again.frames.items())
+
+
 def test_the_way_along_the_road_goes_on_through_junctions(runs):
     """A vehicle's way grows by what it drives, by its speed, from one edge to the next as well."""
     records = read_corridor(runs[0])

@@ -59,7 +59,9 @@ class CorridorFiles(RunFiles):
         if self._keep_in is None:
             result += ["--tripinfo-output", str(self._folder / "tripinfo.xml")]
             result += ["--tripinfo-output.write-unfinished", "--tripinfo-output.write-undeparted"]
-        return result
+            return result
+        at = result.index("--precision")  # kept or not, trips have the same digits
+        return result[:at] + result[at + 2 :]
 
     def trips(self, number: dict[str, int]) -> dict[str, FloatArray]:
         """Returns SUMO's figures of each vehicle's trip, read one by one."""
