@@ -62,7 +62,7 @@ class Hidden(NamedTuple):
         return self.drivers.car_following.lower()
 
 
-class NoBreakdown(Exception):
+class NoBreakdownError(Exception):
     """The data of a hidden population would have no breakdown."""
 
 
@@ -136,7 +136,7 @@ def morning_file(place, hidden, mornings):
     frames, seed = [], hidden.seed
     while len(frames) < mornings:
         if seed > hidden.seed + 10 * mornings:
-            raise NoBreakdown(f"{hidden.name}: the flows do not make its merge break down")
+            raise NoBreakdownError(f"{hidden.name}: the flows do not make its merge break down")
         if not np.isnan(capacities_veh_h(place, hidden, hidden.drivers, [seed]))[0]:
             (frame,) = place.told(hidden.scenario, hidden.flows, hidden.drivers, [seed])
             shift_s = len(frames) * hidden.flows.horizon_s
@@ -307,7 +307,7 @@ def main():
         effort = Effort(runs=given.runs, jobs=given.jobs)
         try:
             row = measured(place, hidden, given.mornings, effort)
-        except NoBreakdown as error:
+        except NoBreakdownError as error:
             print(f"Left out: {error}", flush=True)
             continue
         rows.append(row)
