@@ -62,6 +62,10 @@ class Hidden(NamedTuple):
         return self.drivers.car_following.lower()
 
 
+class NoBreakdownError(Exception):
+    """The data of a hidden population would have no breakdown."""
+
+
 class Place:
     """Simulates populations on scenarios with detectors, and keeps what they told in a folder."""
 
@@ -132,7 +136,7 @@ def morning_file(place, hidden, mornings):
     frames, seed = [], hidden.seed
     while len(frames) < mornings:
         if seed > hidden.seed + 10 * mornings:
-            raise SystemExit(f"{hidden.name}: the flows do not make its merge break down")
+            raise NoBreakdownError(f"{hidden.name}: the flows do not make its merge break down")
         if not np.isnan(capacities_veh_h(place, hidden, hidden.drivers, [seed]))[0]:
             (frame,) = place.told(hidden.scenario, hidden.flows, hidden.drivers, [seed])
             shift_s = len(frames) * hidden.flows.horizon_s
@@ -300,7 +304,12 @@ def main():
     print(HEAD, flush=True)
     rows = []
     for hidden in chosen:
-        row = measured(place, hidden, given.mornings, Effort(runs=given.runs, jobs=given.jobs))
+        effort = Effort(runs=given.runs, jobs=given.jobs)
+        try:
+            row = measured(place, hidden, given.mornings, effort)
+        except NoBreakdownError as error:
+            print(f"Left out: {error}", flush=True)
+            continue
         rows.append(row)
         print(line_of(row), flush=True)
         (given.kept / f"{hidden.name}-{given.mornings}.txt").write_text(
