@@ -177,12 +177,12 @@ def test_readings_and_signals_of_a_metered_ramp_come_back(tmp_path):
 
 def test_a_log_of_another_version_is_refused(tmp_path):
     line = refusal(log_frame().with_columns(version=pl.lit(1, pl.Int64)), tmp_path)
-    assert line == "version: 1 cannot be read; allowed is 2"
+    assert line == "version: 1 cannot be read; allowed is 3"
 
 
 def test_other_columns_are_refused(tmp_path):
     line = refusal(log_frame().drop("std_m"), tmp_path)
-    assert line.startswith("columns are not those of version 2 (std_m); allowed are version, ")
+    assert line.startswith("columns are not those of version 3 (std_m); allowed are version, ")
 
 
 def test_a_file_that_is_no_table_is_refused(tmp_path):
