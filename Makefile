@@ -29,8 +29,10 @@ $(INSTALLED): pyproject.toml constraints.txt
 	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt hatchling editables
 	$(BIN)/pip install --disable-pip-version-check --quiet --constraint constraints.txt --no-build-isolation --editable '.[dev]'
 	@$(BIN)/coramp run paper --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
-	@$(BIN)/coramp run paper --strategy ramp-priority --horizon 30 --mainline 3600 --ramp 1500 >/dev/null
-	@$(BIN)/coramp run motorway --strategy slots --horizon 60 --mainline 2200 --ramp 700 >/dev/null
+	@printf '%s\n' 'paper --strategy ramp-priority --horizon 30 --mainline 3600 --ramp 1500' \
+		'motorway --strategy slots --horizon 60 --mainline 2200 --ramp 700' \
+		'paper --strategy mixed-slots --horizon 30 --set traffic.automated_share=0.5' \
+		| xargs -P 2 -L 1 $(BIN)/coramp run >/dev/null
 	@touch $(INSTALLED)
 
 demo: $(INSTALLED)
