@@ -16,10 +16,10 @@ def test_rules_come_back_with_every_field_in_its_place(flags):
 
 
 def test_every_number_has_a_place_of_its_own():
-    numbers = np.arange(35.0)
+    numbers = np.arange(36.0)
     rules = unpacked(numbers)
     assert isinstance(rules, Rules)
-    assert [float(value) for part in rules for value in part][:31] == numbers[:31].tolist()
+    assert [float(value) for part in rules for value in part][:32] == numbers[:32].tolist()
     assert (rules.control.gap_at_front, rules.control.create_from_nose) == (True, True)
-    assert rules.traffic == (True, 34.0)
-    assert len(packed(RULES)) == 35
+    assert rules.traffic == (True, 35.0)
+    assert len(packed(RULES)) == 36
