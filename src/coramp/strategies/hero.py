@@ -149,7 +149,7 @@ def balanced_queues_veh(meters: Sequence[Meter]) -> list[float]:
 class Hero(Alinea):
     """ALINEA at each ramp of a corridor; a ramp whose queue grows has those upstream hold back.
 
-    It is for corridors: one ramp alone is metered as by ALINEA, with control of its queue.
+    It is for corridors with two ramps or more on a road, and is refused elsewhere.
     """
 
     name: ClassVar[str] = "hero"
