@@ -5,8 +5,8 @@ import sys
 import time
 
 import pytest
-from distributed import Client
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadFileScheduling
 
 from coramp.strategies import registry
 
@@ -28,21 +28,27 @@ def _only_our_strategies():
         yield
 
 
-@pytest.hookimpl(tryfirst=True)
+class ByModule(LoadFileScheduling):
+    """Runs each module on one worker, and each page of the docs as if it were a module."""
+
+    def _split_scope(self, nodeid):
+        return nodeid if runs_a_page(nodeid) else super()._split_scope(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Returns who spreads tests over the workers."""
+    return ByModule(config, log)
+
+
 def pytest_collection_modifyitems(items):
-    """Runs each module on one worker, and each page of the docs as if it were a module.
-
-    Pages take longest, so they come first: what is left at the end is short.
-    """
-    for item in items:
-        group = item.name if runs_a_page(item) else item.nodeid.split("::")[0]
-        item.add_marker(pytest.mark.xdist_group(group))
-    items.sort(key=lambda item: not runs_a_page(item))
+    """Puts pages first: they take longest, and what is left at the end is short."""
+    items.sort(key=lambda item: not runs_a_page(item.nodeid))
 
 
-def runs_a_page(item):
+def runs_a_page(nodeid):
     """Returns whether a test runs a page of the docs."""
-    return item.name.startswith("test_page_runs[")
+    return "::test_page_runs[" in nodeid
 
 
 def _started(*arguments):
@@ -57,6 +63,8 @@ def _started(*arguments):
 @pytest.fixture
 def dask(tmp_path):
     """A scheduler's address and the processes of its two workers."""
+    from distributed import Client  # takes a second, and few tests need it
+
     contact = tmp_path / "scheduler.json"
     processes = [
         _started(
