@@ -100,7 +100,7 @@ def test_a_vehicle_is_the_same_at_all_sites_and_links_are_not(tmp_path, network,
 
 
 def test_a_process_that_ends_is_told_in_one_line(tmp_path, network, monkeypatch):
-    def gone(plant, sites, careless, cap_step):
+    def gone(plant, sites, *_):
         for line in sites._lines:
             line.send_bytes(b"no view")  # what no process can read
         return sites.handle([None, None])

@@ -14,7 +14,7 @@ from coramp.records.files import read_json
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.plain_data import DEEPEST, long_key_in, problem_with
 from coramp.studies.definition import load_study
-from coramp.studies.store import _checksum, _part_in
+from coramp.studies.store import OF_ONE_SITE, _checksum, _part_in
 from tests.edges import SMALL_STUDY, assert_refused, built_in, edited, invoke
 
 DIGITS = "9" * 5000
@@ -136,13 +136,13 @@ class TestPart:
         return next((study / "o" / "parts").glob("*.json"))
 
     def test_a_part_as_it_is_written_is_whole(self, study):
-        assert _part_in(self.part(study)) is not None
+        assert _part_in(self.part(study), OF_ONE_SITE) is not None
 
     @pytest.mark.parametrize("content", ["[" * 100_000, DIGITS, "[]", "1", '{"run": 1}'])
     def test_a_hostile_part_is_a_damaged_one(self, study, tmp_path, content):
         path = tmp_path / "a.json"
         path.write_text(content)
-        assert _part_in(path) is None
+        assert _part_in(path, OF_ONE_SITE) is None
 
     @pytest.mark.parametrize(
         "edit",
@@ -159,7 +159,7 @@ class TestPart:
         content["sha256"] = _checksum(content["run"], content["streams"])
         path = tmp_path / self.part(study).name
         path.write_text(json.dumps(content))
-        assert _part_in(path) is None
+        assert _part_in(path, OF_ONE_SITE) is None
 
     @pytest.mark.parametrize(
         ("edit", "expected"),

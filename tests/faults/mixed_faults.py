@@ -86,13 +86,6 @@ PROTOCOL = (
         f"{OF_AIR}::test_a_clock_that_is_wrong_shifts_the_stamp_and_so_the_station",
     ),
     _fault(
-        "who has left the road is still reckoned with",
-        AIR,
-        "number = number[place[number] >= 0]",
-        "number = number[place[number] >= -1]",
-        f"{OF_AIR}::test_who_has_left_the_road_is_not_known",
-    ),
-    _fault(
         "reports are carried on beyond the road",
         AIR,
         "& (station_m < end_m + BEYOND_M)",

@@ -107,8 +107,8 @@ def test_one_who_stands_changes_without_sumos_check_once_sumo_has_refused_for_a_
     for _ in range(6):
         commanded(plant, changes=True)
     assert session.of_lanes() == [
-        *[("change_lane_if_clear", "r1", 1, 0.1)] * 5,
-        ("change_lane_now", "r1", 1, 2),
+        *[("change_lane_if_clear", "r1", 0.1)] * 5,
+        ("change_lane_now", "r1", 2),
     ]
 
 
@@ -117,7 +117,7 @@ def test_one_who_moves_never_changes_without_sumos_check():
     plant = on_the_acceleration_lane(session)
     for _ in range(20):
         commanded(plant, changes=True)
-    assert session.of_lanes() == [("change_lane_if_clear", "r1", 1, 0.1)] * 20
+    assert session.of_lanes() == [("change_lane_if_clear", "r1", 0.1)] * 20
 
 
 def test_drivers_make_room_again_for_one_whose_merge_was_refused():

@@ -82,12 +82,13 @@ METERS: Schema = {
     "role": pl.String,
     "master": pl.String,
 }
+METERS_FILE = "meters"
 CORRIDOR_FILES: Mapping[str, Schema] = {
     "sites": SITES,
     "trips": TRIPS,
     "passages": PASSAGES,
     "hand_overs": HAND_OVERS,
-    "meters": METERS,
+    METERS_FILE: METERS,
 }
 """The tables of a corridor's run by the names of their files; the last where ramps are metered."""
 TOTALS = (

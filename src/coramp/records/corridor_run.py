@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from coramp.errors import CorampError
-from coramp.records.corridor_outcome import CORRIDOR_FILES, SITES, TOTALS
+from coramp.records.corridor_outcome import CORRIDOR_FILES, METERS_FILE, SITES, TOTALS
 from coramp.records.files import read_json
 from coramp.records.run_folder import CORRIDOR, MARK, SUMO, SUMO_NETWORK, check_version
 from coramp.records.schemas import Row, Schema
@@ -121,6 +121,8 @@ def read_corridor(folder: Path) -> CorridorRecords:
     frames = {}
     for name, schema in CORRIDOR_FILES.items():
         path = folder / f"{name}.parquet"
+        if name == METERS_FILE and not path.exists():  # no ramp was metered
+            continue
         try:
             frames[name] = checked_frame(path, pl.read_parquet(path), schema)
         except (OSError, pl.exceptions.PolarsError) as error:

@@ -127,6 +127,7 @@ def own_rules(traits: FloatArray, rules: Rules, on_ramp: bool) -> Rules:
             ramp_speed_mps=ramp_mps,
             ramp_limit_mps=min(road.ramp_limit_mps, traits[TOP_SPEED]),
             merge_angle_rad=road.merge_angle_rad,
+            lanes=road.lanes,
         ),
         safety=SafetyBudget(
             positioning_error_m=traits[POSITIONING],
