@@ -116,13 +116,13 @@ def test_what_is_for_one_merge_site_says_so(tmp_path, network):
         assert found[0].startswith(f"Error: {line}")
 
 
-def test_a_folder_that_holds_a_corridor_is_replaced_and_read_by_nothing_else(tmp_path, network):
+def test_a_folder_that_holds_a_corridor_is_replaced_and_not_audited(tmp_path, network):
     path, out = written(tmp_path, network, horizon_s=20.0), tmp_path / "out"
     for _ in range(2):
         told = invoke("run", path, "-s", "mixed-slots", "--out", out)
         assert told.code == 0
         assert "on2@merge2" in told.out
-    told = invoke("report", out)
+    told = invoke("audit", out)
     assert_refused(told)
     assert "holds the run of a corridor" in told.errors[0]
 
