@@ -25,6 +25,7 @@ LIMITS = Limits(
     braking_mps2=6.0,
     driver_gap_m=2.5,
     driver_gap_s=1.0,
+    least_driver_gap_s=1.0,
     relax_m=1.5,
     relax_at_end_m=0.0,
     lane_end_m=200.0,
@@ -241,6 +242,13 @@ def test_towards_the_lanes_end_he_is_left_less():
     relaxed = LIMITS._replace(relax_at_end_m=4.0)
     assert merging(41.68, limits=relaxed).unkept == ()
     assert len(merging(41.65, limits=relaxed).unkept) == 1
+
+
+def test_at_the_lanes_end_the_shortest_time_gap_is_enough():
+    """At 100 of 200 m a quarter of the way from 1 to 0.6 s: 0.1 s, 2 m less."""
+    various = LIMITS._replace(least_driver_gap_s=0.6)
+    assert merging(40.68, limits=various).unkept == ()
+    assert len(merging(40.65, limits=various).unkept) == 1
 
 
 @pytest.mark.parametrize(("comes_in", "told"), [(5, 0), (4, 0), (3, 0), (2, 1), (None, 1)])

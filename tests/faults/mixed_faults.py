@@ -239,9 +239,23 @@ PROMISES = (
     _fault(
         "a driver who moves is left less than his standstill gap",
         ON_BOARD,
-        "near_m = min(laws.gaps.of_driver_m,",
+        "near_m = min(gaps.of_driver_m,",
         "near_m = min(0.0,",
         f"{OF_BOARD}::test_a_driver_who_moves_is_left_his_standstill_gap_at_least",
+    ),
+    _fault(
+        "a faster vehicle asks the driver ahead for room",
+        ON_BOARD,
+        "            asks[own] = users.speed_mps[own] <= users.speed_mps[ahead]",
+        "            asks[own] = True",
+        "tests/worlds/test_asking_for_room.py",
+    ),
+    _fault(
+        "who merges at the lane's end leaves a driver less than anybody keeps",
+        ON_BOARD,
+        "shorter_s = (gaps.of_driver_s - gaps.least_of_driver_s) * share * share",
+        "shorter_s = gaps.of_driver_s * share * share",
+        f"{OF_BOARD}::test_a_driver_behind_is_left_what_drivers_keep_on_average_and_at_the_end_the_least",
     ),
     _fault(
         "a lane change looks at nobody in front",

@@ -16,6 +16,7 @@ GAPS = Gaps(
     of_driver_s=1.0,
     for_driver_m=2.5,
     for_driver_s=1.3,
+    least_of_driver_s=1.0,
 )
 FOLLOWING = FollowingLaw(
     gap_gain_ps2=0.5,

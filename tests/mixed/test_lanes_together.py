@@ -62,11 +62,11 @@ def decided(situation):
     nobody = np.zeros(len(rows), np.bool_)
     of_lanes, wish = Lanes(number, number < lanes - 1, nobody), np.array(wishes, np.bool_)
     laws = ON_BOARD, on_endless_lanes(ON_BOARD)
-    obeys, accels, changes = decided_in_lanes(
+    obeys, accels, changes, asks = decided_in_lanes(
         users, of_lanes, ahead, np.array(told, np.float64), wish, *laws
     )
     assert np.isfinite(accels).all()
-    assert len(obeys) == len(accels) == len(changes) == len(rows)
+    assert len(obeys) == len(accels) == len(changes) == len(asks) == len(rows)
     return accels.tolist(), changes.tolist()
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from coramp.mixed.laws import FollowingLaw, OnBoardLaws, SafetyLaw
 from coramp.mixed.on_board import (
     Ahead,
+    asks_for_room,
     distance_speed_mps,
     driven_mps2,
     may_change_lane,
@@ -219,6 +220,42 @@ def test_towards_the_lanes_end_a_driver_behind_is_left_less():
     assert not may(98.5, 14.0, 42.65, 20.0)
     assert may(197.0, 6.0, 3.01, 6.0)
     assert not may(197.0, 6.0, 2.99, 6.0)
+
+
+def test_a_driver_behind_is_left_what_drivers_keep_on_average_and_at_the_end_the_least():
+    """By hand, both at 20 m/s: 2.5 + 20 T - 1.5 m, with T = 1.2 s early, 1.2 - 0.3 / 4 s half-way.
+
+    That is 25 m, 23.5 m at 98.5 of 197 m, and with T = 0.9 s 19 m at the end.
+    """
+    laws = ON_BOARD._replace(gaps=GAPS._replace(of_driver_s=1.2, least_of_driver_s=0.9))
+
+    def may(own_m, gap_m):
+        rear_m = own_m - 5.0 - gap_m
+        users = users_of([(own_m, 20.0, False, True), (rear_m, 20.0, True, False)])
+        return may_change(users, 20.0, laws=laws)
+
+    assert may(1.0, 25.01)
+    assert not may(1.0, 24.99)
+    assert may(98.5, 23.51)
+    assert not may(98.5, 23.49)
+    assert may(197.0, 19.01)
+    assert not may(197.0, 18.99)
+
+
+def test_who_is_faster_than_the_driver_ahead_asks_nobody_for_room():
+    """SUMO would keep that driver from speeding up; an automated vehicle ahead is not SUMO's."""
+
+    def asks(own, *others):
+        users = users_of([own, *others])
+        return asks_for_room(users, neighbours_of(users).front).tolist()
+
+    behind, ahead = (30.0, 25.0, True, False), (70.0, 15.0, True, False)
+    assert asks((50.0, 15.1, False, True), ahead, behind) == [False, False, False]
+    assert asks((50.0, 15.0, False, True), ahead, behind) == [True, False, False]
+    assert asks((50.0, 15.1, False, True), behind) == [True, False]
+    assert asks((50.0, 15.1, False, True), (70.0, 15.0, True, True), behind) == [True, False, False]
+    assert asks((50.0, 15.0, False, False), ahead) == [False, False]
+    assert asks((50.0, 15.0, True, True), ahead) == [False, False]
 
 
 def test_a_driver_who_moves_is_left_his_standstill_gap_at_least():

@@ -95,9 +95,27 @@ def on_the_acceleration_lane(session):
     return plant
 
 
-def commanded(plant, changes):
+def commanded(plant, changes, asks=True):
     names, _, users = plant.users()
-    plant.command(names, users, np.zeros(1), np.array([changes]))
+    plant.command(names, users, np.zeros(1), np.array([changes]), np.array([asks]))
+
+
+def test_sumo_is_told_once_that_a_vehicle_asks_for_room_or_no_longer():
+    session = Told(speed_mps=3.0)
+    plant = on_the_acceleration_lane(session)
+    for asks in (True, True, False, False, True):
+        commanded(plant, changes=False, asks=asks)
+    told = [call for call in session.calls if call[0] == "ask_drivers"]
+    assert told == [("ask_drivers", "r1", False), ("ask_drivers", "r1", True)]
+
+
+def test_who_is_told_to_merge_does_not_ask_any_more():
+    session = Told(speed_mps=3.0)
+    plant = on_the_acceleration_lane(session)
+    commanded(plant, changes=True, asks=True)
+    session.calls.clear()
+    commanded(plant, changes=True, asks=False)
+    assert not [call for call in session.calls if call[0] == "ask_drivers"]
 
 
 def test_one_who_stands_changes_without_sumos_check_once_sumo_has_refused_for_a_second():

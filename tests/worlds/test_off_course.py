@@ -38,7 +38,8 @@ def test_a_vehicle_that_is_not_where_it_was_sent_is_found(off_m):
     session = Pushed()
     plant = plant_of(session)
     names, _, users = plant.users()
-    plant.command(names, users, np.zeros(1), np.zeros(1, np.bool_))
+    nobody = np.zeros(1, np.bool_)
+    plant.command(names, users, np.zeros(1), nobody, nobody)
     session.position_m = 104.0 + off_m
     plant.users()
     assert plant.largest_error_m[0] == pytest.approx(abs(off_m), abs=1e-9)

@@ -51,16 +51,18 @@ class Seen(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The leader's braking b (m/s2) that is reckoned with, and what a driver behind keeps.
+    """The leader's braking b (m/s2) that is reckoned with, and what a driver behind is left.
 
-    ``relax_m`` is by how much a lane change may fall short of that, ``relax_at_end_m`` by how much
-    more where the acceleration lane ends, at ``lane_end_m``; before that it grows with the square
-    of the station.
+    That is ``driver_gap_m`` and a time gap: ``driver_gap_s``, which drivers keep on average, and
+    where the acceleration lane ends, at ``lane_end_m``, ``least_driver_gap_s``, the shortest.
+    ``relax_m`` is by how much a lane change may fall short, ``relax_at_end_m`` by how much more at
+    the lane's end. Before that both changes grow with the square of the station.
     """
 
     braking_mps2: float
     driver_gap_m: float
     driver_gap_s: float
+    least_driver_gap_s: float
     relax_m: float
     relax_at_end_m: float
     lane_end_m: float
@@ -186,7 +188,8 @@ def _pushed_in(seen: Seen, pairs: Pairs, came_in: BoolArray, limits: Limits) -> 
     """
     own, rear = seen.speed_mps[pairs.front], seen.speed_mps[pairs.rear]
     share = np.maximum(0.0, seen.station_m[pairs.front] / limits.lane_end_m)
-    needs_m = limits.driver_gap_m + limits.driver_gap_s * rear
+    shorter_s = (limits.driver_gap_s - limits.least_driver_gap_s) * share**2
+    needs_m = limits.driver_gap_m + (limits.driver_gap_s - shorter_s) * rear
     needs_m -= limits.relax_m + limits.relax_at_end_m * share**2
     needs_m += (rear**2 - own**2) / (2.0 * COMFORT_MPS2)
     near_m = np.minimum(limits.driver_gap_m, STANDING_M + limits.driver_gap_s * rear)

@@ -7,6 +7,7 @@ import polars as pl
 
 from coramp.explain.mixed_gaps import Drove
 from coramp.mixed import binding as b
+from coramp.mixed.users import Gaps
 from coramp.records.run import RunRecords
 from coramp.records.schemas import Row
 from coramp.road.lanes import mainline_lane
@@ -33,7 +34,7 @@ def assumed(drove: Drove) -> list[str]:
             f"is to merge it leaves {gaps.for_driver_m:g} m + {gaps.for_driver_s:g} s."
         ),
         (
-            f"A driver keeps {gaps.of_driver_m:g} m + {gaps.of_driver_s:g} s, and brakes at "
+            f"A driver keeps {gaps.of_driver_m:g} m + {_of_drivers(gaps)}, and brakes at "
             f"{safety.driver_mps2:g} m/s2 at most for who merges ahead of him."
         ),
         (
@@ -53,6 +54,13 @@ def assumed(drove: Drove) -> list[str]:
             f"most; a command counts for {scenario.commands.valid_s:g} s."
         )
     return lines
+
+
+def _of_drivers(gaps: Gaps) -> str:
+    """Returns the time gaps of drivers in words."""
+    if gaps.least_of_driver_s == gaps.of_driver_s:
+        return f"{gaps.of_driver_s:g} s"
+    return f"{gaps.of_driver_s:g} s on average (at least {gaps.least_of_driver_s:g} s)"
 
 
 def done(row: Row, drove: Drove) -> str:

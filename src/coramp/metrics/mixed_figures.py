@@ -98,7 +98,8 @@ def limits_of(scenario: Scenario, drivers: DriverPopulation) -> Limits:
     return Limits(
         law.braking_mps2,
         drivers.min_gap_m,
-        max(drivers.taus_s),
+        drivers.mean_tau_s,
+        min(drivers.taus_s),
         law.relax_m,
         law.relax_at_end_m,
         scenario.ramp.acceleration_lane_m - LANE_END_M,

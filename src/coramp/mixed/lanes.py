@@ -13,6 +13,7 @@ from coramp.mixed.laws import OnBoardLaws
 from coramp.mixed.on_board import (
     Ahead,
     Neighbours,
+    asks_for_room,
     driven_and_changes,
     driven_mps2,
     may_be_between,
@@ -77,12 +78,13 @@ def decided_in_lanes(
     wishes: BoolArray,
     laws: OnBoardLaws,
     endless: OnBoardLaws,
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Returns what each vehicle obeys, its acceleration (m/s2), and who changes lanes.
+) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+    """Returns what each vehicle obeys, its acceleration (m/s2), who changes lanes, and who asks.
 
     ``told_mps2`` is the most that each is told to speed up, ``wishes`` who on the acceleration lane
     wishes to merge; ``endless`` are the laws ``on_endless_lanes``. Who makes way obeys nothing any
-    more, since what it was told is for the lane that it leaves.
+    more, since what it was told is for the lane that it leaves. Who asks is as in
+    ``asks_for_room``.
     """
     around = neighbours_in_lanes(users, lanes)
     changes = driven_and_changes(users, around, ahead, told_mps2, wishes, laws)[1]
@@ -95,7 +97,7 @@ def decided_in_lanes(
     for own in making_way(users, around, ahead, held, told_mps2, endless):
         changes[own], obeys_mps2[own] = True, np.inf
     accel_mps2 = driven_mps2(users, around, ahead, obeys_mps2, changes, laws)
-    return obeys_mps2, accel_mps2, changes
+    return obeys_mps2, accel_mps2, changes, asks_for_room(users, around.front)
 
 
 @kernel

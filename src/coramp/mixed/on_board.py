@@ -161,20 +161,23 @@ def _may_be_behind(
 def _leaves_driver_room(
     users: RoadUsers, own: int, rear: int, slowest_mps: float, until_s: float, laws: OnBoardLaws
 ) -> bool:
-    """Whether a driver behind has what he keeps, and what braking in comfort takes.
+    """Whether a driver behind has what drivers keep, and what braking in comfort takes.
 
-    One who moves has s_0 at least, however fast the vehicle is that merges.
+    His own time gap T cannot be seen. He yields until he has that, and no further: so the mean T of
+    drivers is enough, and towards the lane's end the shortest. One who moves has s_0 at least,
+    however fast the vehicle is that merges.
     """
-    safety = laws.safety
+    safety, gaps = laws.safety, laws.gaps
     rear_mps = users.speed_mps[rear] + max(0.0, users.accel_mps2[rear]) * until_s
     squares = rear_mps**2 - slowest_mps**2
     braking_m = max(squares / (2.0 * safety.driver_mps2), squares / (2.0 * safety.driver_dry_mps2))
     share = max(0.0, users.station_m[own] / safety.lane_end_m)
     relax_m = safety.relax_m + safety.relax_at_end_m * share * share
-    needs_m = gap_m(False, True, rear_mps, laws.gaps) + braking_m - relax_m
+    shorter_s = (gaps.of_driver_s - gaps.least_of_driver_s) * share * share
+    needs_m = gap_m(False, True, rear_mps, gaps) - shorter_s * rear_mps + braking_m - relax_m
     free_m = users.station_m[own] - users.length_m[own] - users.station_m[rear]
     free_m -= max(0.0, rear_mps - slowest_mps) * until_s
-    near_m = min(laws.gaps.of_driver_m, _touching_m(users, rear) + laws.gaps.of_driver_s * rear_mps)
+    near_m = min(gaps.of_driver_m, _touching_m(users, rear) + gaps.of_driver_s * rear_mps)
     return bool(free_m >= max(near_m, needs_m))
 
 
@@ -288,6 +291,21 @@ def driven_and_changes(
             slowest_mps = min(slower_mps, ahead.speed_mps[own])
             changes[own] = may_change_lane(users, own, around, ahead, slowest_mps, laws)
     return driven_mps2(users, around, ahead, told_mps2, changes, laws), changes
+
+
+@kernel
+def asks_for_room(users: RoadUsers, front: IntArray) -> BoolArray:
+    """Returns which automated vehicles on the ramp ask drivers on the mainline to make room.
+
+    ``front`` is who is before each on the mainline. One that is faster than a driver before it asks
+    nobody: SUMO would take it for one that overtakes him, and keep him from speeding up.
+    """
+    asks = users.automated & ~users.on_mainline
+    for own in range(len(asks)):
+        ahead = front[own]
+        if asks[own] and ahead >= 0 and not users.automated[ahead]:
+            asks[own] = users.speed_mps[own] <= users.speed_mps[ahead]
+    return asks
 
 
 @kernel

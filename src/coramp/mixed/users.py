@@ -39,7 +39,8 @@ class Gaps(NamedTuple):
     """Distances to the vehicle ahead, each s_0 (m) and T (s) of s_0 + T v.
 
     An automated vehicle keeps ``behind_automated`` or ``behind_driver``. A driver keeps
-    ``of_driver``; ``for_driver`` is room for a driver who is to merge ahead.
+    ``of_driver`` on average, and no less than ``least_of_driver_s``; ``for_driver`` is room for a
+    driver who is to merge ahead.
     """
 
     behind_automated_m: float
@@ -50,6 +51,7 @@ class Gaps(NamedTuple):
     of_driver_s: float
     for_driver_m: float
     for_driver_s: float
+    least_of_driver_s: float
 
 
 class MixedRoad(NamedTuple):

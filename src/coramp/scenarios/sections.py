@@ -190,6 +190,11 @@ class DriverPopulation(Model):
         """The time gaps that drivers keep, equally likely."""
         return self.tau_s if isinstance(self.tau_s, tuple) else (self.tau_s,)
 
+    @property
+    def mean_tau_s(self) -> float:
+        """The time gap that drivers keep on average."""
+        return sum(self.taus_s) / len(self.taus_s)
+
 
 class TrafficMix(Model):
     """Which vehicles are automated and which have drivers, in SUMO.

@@ -214,7 +214,8 @@ class CorridorPlant(LanedPlant):
         whole, inside = self._whole, self._whole.inside
         names = [whole.names[i] for i in np.flatnonzero(inside).tolist()]
         users = RoadUsers._make([column[inside] for column in whole.users])
-        changes = np.concatenate([answer.changes for answer in answers])[inside]
         accel_mps2 = np.concatenate([answer.accel_mps2 for answer in answers])[inside]
+        changes = np.concatenate([answer.changes for answer in answers])[inside]
+        asks = np.concatenate([answer.asks for answer in answers])[inside]
         self.record.change(users.number[changes & (whole.lane[inside] >= OUTERMOST)].tolist())
-        self.command(names, users, accel_mps2, changes)
+        self.command(names, users, accel_mps2, changes, asks)

@@ -63,10 +63,20 @@ class SiteView(NamedTuple):
 
 
 class SiteAnswer(NamedTuple):
-    """What a site's coordinator answers, one entry a user: accelerations, and who changes lanes."""
+    """What a site's coordinator answers, one entry a user.
+
+    How each accelerates, who changes lanes, and who asks drivers to make room.
+    """
 
     accel_mps2: FloatArray
     changes: BoolArray
+    asks: BoolArray
+
+    @classmethod
+    def nothing(cls, count: int) -> "SiteAnswer":
+        """Returns the answer to a view without automated vehicles."""
+        nobody = np.zeros(count, np.bool_)
+        return cls(np.zeros(count), nobody, nobody)
 
 
 @dataclass
@@ -112,13 +122,13 @@ class SiteCoordinator:
         """Returns what those of whom the coordinator is told are to do until the next time."""
         users = view.users
         if not users.automated.any():
-            return SiteAnswer(np.zeros(len(users.number)), np.zeros(len(users.number), np.bool_))
+            return SiteAnswer.nothing(len(users.number))
         shown = self._shown
         shown.lane, shown.beside, shown.tail = view.lane, view.beside, view.tail
         shown.now = view.ahead
         moment = self._control.decided(view.now_s, [], view.able, users)
         driven = self._control.driven(moment, shown)
-        return SiteAnswer(driven.accel_mps2, driven.changes)
+        return SiteAnswer(driven.accel_mps2, driven.changes, driven.asks)
 
     @property
     def counts(self) -> dict[str, int]:

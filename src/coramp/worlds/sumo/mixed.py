@@ -12,7 +12,13 @@ from coramp.coordination.plant import Arrival
 from coramp.demand.arrivals import arrivals_of, automated_of, connected_of
 from coramp.mixed.lanes import Lanes
 from coramp.mixed.laws import OnBoardLaws
-from coramp.mixed.on_board import Ahead, Neighbours, driven_and_changes, neighbours_of
+from coramp.mixed.on_board import (
+    Ahead,
+    Neighbours,
+    asks_for_room,
+    driven_and_changes,
+    neighbours_of,
+)
 from coramp.mixed.situation import MixedSituation, MixedStrategy, Places, Steering
 from coramp.mixed.users import RoadUsers, soon
 from coramp.records.outcome import Outcome
@@ -133,13 +139,15 @@ class Driven(NamedTuple):
     """What vehicles were told at a decision and what they did, one entry a user.
 
     ``told_mps2`` is how much each was to speed up at most, ``wishes`` who on the acceleration lane
-    was to merge; ``accel_mps2`` is how each is driven, ``changes`` who changes lanes.
+    was to merge; ``accel_mps2`` is how each is driven, ``changes`` who changes lanes, ``asks`` who
+    asks drivers to make room.
     """
 
     told_mps2: FloatArray
     wishes: BoolArray
     accel_mps2: FloatArray
     changes: BoolArray
+    asks: BoolArray
 
 
 @dataclass
@@ -176,7 +184,7 @@ class MixedRun:
         accel_mps2 = self.careless.with_breakdown(moment.now_s, users, driven.accel_mps2)
         if self.control.notes is not None:
             self.control.note(moment, self.plant.ahead(users), accel_mps2, driven.changes)
-        self.plant.command(moment.names, users, accel_mps2, driven.changes)
+        self.plant.command(moment.names, users, accel_mps2, driven.changes, driven.asks)
         return driven
 
     def outcome(self, end_s: float | None = None) -> Outcome:
@@ -253,7 +261,8 @@ class Control:
         accel_mps2, changes = driven_and_changes(
             users, around, plant.ahead(users), most_mps2, wishes, self.laws
         )
-        return Driven(most_mps2, wishes, accel_mps2, changes)
+        asks = asks_for_room(users, around.front)
+        return Driven(most_mps2, wishes, accel_mps2, changes, asks)
 
     def note(
         self, moment: Moment, ahead: Ahead, accel_mps2: FloatArray, changes: BoolArray

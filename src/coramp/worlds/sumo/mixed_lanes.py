@@ -208,10 +208,10 @@ class LanedControl(Control):
         most_mps2, may_merge = self._told(moment, self._lane)
         lanes = self._lanes
         wishes = may_merge & moment.able & users.automated & (lanes.number == RAMP_LANE)
-        obeys_mps2, accel_mps2, changes = decided_in_lanes(
+        obeys_mps2, accel_mps2, changes, asks = decided_in_lanes(
             users, lanes, plant.ahead(users), most_mps2, wishes, laws, endless
         )
-        return Driven(obeys_mps2, wishes, accel_mps2, changes)
+        return Driven(obeys_mps2, wishes, accel_mps2, changes, asks)
 
     def _told(self, moment: Moment, lane: IntArray) -> tuple[FloatArray, BoolArray]:
         """What those of the outer lanes were told; others are told nothing."""

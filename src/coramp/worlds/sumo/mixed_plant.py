@@ -54,6 +54,7 @@ class MixedPlant:
     actuators: SlowActuators
     _motion: Motion = field(init=False)
     _changing: BoolArray = field(init=False)
+    _asking: BoolArray = field(init=False)
     _from_ramp: BoolArray = field(init=False)
     _lane_numbers: dict[str, int] = field(init=False)
     _starts_m: FloatArray = field(init=False)
@@ -71,6 +72,7 @@ class MixedPlant:
             largest_error_m=np.where(self.able.automated, 0.0, np.nan),
         )
         self._changing, self._from_ramp = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        self._asking = np.zeros(count, np.bool_)
         lanes = list(self.lane_starts_m)
         self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
         self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
@@ -128,14 +130,23 @@ class MixedPlant:
         return Ahead(way_m, speed_mps, self.actuators.delay_s)
 
     def command(
-        self, names: Sequence[str], users: RoadUsers, accel_mps2: FloatArray, changes: BoolArray
+        self,
+        names: Sequence[str],
+        users: RoadUsers,
+        accel_mps2: FloatArray,
+        changes: BoolArray,
+        asks: BoolArray,
     ) -> None:
-        """Takes over who is new, and has vehicles change lanes; then all drive for a period."""
+        """Takes over who is new, and has vehicles ask for room and change lanes.
+
+        Then all drive for a period.
+        """
         own = np.flatnonzero(users.automated)
         number = users.number[own]
         for i in own[np.isnan(self._motion.sent_mps[number])].tolist():
             self._take_over(names[i], int(users.number[i]), bool(users.on_mainline[i]))
         self._settle(names, users, own, changes)
+        self._ask(names, users, own, asks)
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self._change_lane(names[i])
@@ -150,7 +161,7 @@ class MixedPlant:
         if on_mainline:
             self.session.take_over(name)
             return
-        self._from_ramp[number] = True
+        self._from_ramp[number] = self._asking[number] = True
         self.session.take_over_among_drivers(name)
         self.session.judge_gaps_by(name, NO_GAP_M, NOT_ASSERTIVE)
 
@@ -174,6 +185,14 @@ class MixedPlant:
         for i in own[changing & ~on_mainline & ~changes[own]].tolist():
             self._changing[users.number[i]] = False
             self._take_over(names[i], int(users.number[i]), on_mainline=False)
+
+    def _ask(self, names: Sequence[str], users: RoadUsers, own: IntArray, asks: BoolArray) -> None:
+        """Has those on the ramp who are not told to merge ask drivers for room, or no longer."""
+        number = users.number[own]
+        waits = ~users.on_mainline[own] & ~self._changing[number]
+        for i in own[waits & (asks[own] != self._asking[number])].tolist():
+            self.session.ask_drivers(names[i], bool(asks[i]))
+            self._asking[users.number[i]] = asks[i]
 
     def _forget_change(self, number: int) -> None:
         """Is told that a vehicle neither merges nor changes lanes any more."""

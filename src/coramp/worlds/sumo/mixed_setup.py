@@ -18,7 +18,7 @@ from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
 MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.15
 """How much more than behind an automated vehicle one keeps behind a driver."""
 MORE_FOR_DRIVER_S = 0.25
-"""How much more than a driver's own gap room for one who merges has."""
+"""How much more than drivers keep on average room for one who merges has."""
 KEPT_HALFWAY = SequenceLaw().slowest_share
 """Half-way along the acceleration lane a vehicle may still have this share of the mainline's speed.
 
@@ -46,7 +46,7 @@ def kept_gap(scenario: Scenario, law: SafetyLaw, delay_s: float) -> tuple[float,
 def gaps_of(kept: tuple[float, float], drivers: DriverPopulation) -> Gaps:
     """Returns which gaps vehicles keep, with what automated ones keep behind one another."""
     own_m, own_s = kept
-    theirs_m, theirs_s = drivers.min_gap_m, max(drivers.taus_s)
+    theirs_m, theirs_s = drivers.min_gap_m, drivers.mean_tau_s
     return Gaps(
         behind_automated_m=own_m,
         behind_automated_s=own_s,
@@ -56,6 +56,7 @@ def gaps_of(kept: tuple[float, float], drivers: DriverPopulation) -> Gaps:
         of_driver_s=theirs_s,
         for_driver_m=theirs_m,
         for_driver_s=theirs_s + MORE_FOR_DRIVER_S,
+        least_of_driver_s=min(drivers.taus_s),
     )
 
 

@@ -154,6 +154,11 @@ class Session:
         libsumo.vehicle.setSpeedMode(vehicle_id, OBEY)
         libsumo.vehicle.setLaneChangeMode(vehicle_id, DRIVERS_CHANGES)
 
+    def ask_drivers(self, vehicle_id: str, asks: bool) -> None:
+        """Has SUMO ask drivers to make room for a vehicle that was taken over, or no longer."""
+        mode = DRIVERS_CHANGES if asks else NO_CHANGES
+        libsumo.vehicle.setLaneChangeMode(vehicle_id, mode)
+
     def force(self, vehicle_id: str, speed_mps: float, time_s: float) -> None:
         """Has a driver change to a speed in his lane, whatever is around him, until released."""
         _check_speed(vehicle_id, speed_mps)
