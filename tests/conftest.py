@@ -1,5 +1,6 @@
 """Settings that all tests share."""
 
+import gc
 import subprocess
 import sys
 import time
@@ -44,6 +45,13 @@ def pytest_xdist_make_scheduler(config, log):
 def pytest_collection_modifyitems(items):
     """Puts pages first: they take longest, and what is left at the end is short."""
     items.sort(key=lambda item: not runs_a_page(item.nodeid))
+
+
+def pytest_collection_finish():
+    """Has Python look seldom for what is no longer needed: what is imported by now stays."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000)
 
 
 def runs_a_page(nodeid):

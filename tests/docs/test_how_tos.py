@@ -1,7 +1,8 @@
 """Every block of the tutorial, each how-to page and experiment runs, in a folder of its own.
 
 As a reader would follow it: all blocks in the order of the page, those of shell in one terminal, so
-that a ``cd`` holds on, under ``set -e`` and with this Python's folder first on the path. Blocks of
+that a ``cd`` holds on, under ``set -e`` and with this Python's folder on the path. The tutorial
+calls the installed ``coramp``, other pages one that has been imported already. Blocks of
 Python share one namespace a page, and run where the terminal is. A block after
 ``<!-- not run: why -->`` is left out.
 """
@@ -16,9 +17,12 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.docs.warm import WarmCoramp
+
 DOCS = Path(__file__).parents[2] / "docs"
+TUTORIAL = DOCS / "tutorial.md"
 PAGES = [
-    DOCS / "tutorial.md",
+    TUTORIAL,
     *sorted((DOCS / "how-to").glob("*.md")),
     *sorted((DOCS / "experiments").glob("*.md")),
 ]
@@ -45,9 +49,9 @@ def blocks(text):
 class Terminal:
     """One bash for all blocks of a page."""
 
-    def __init__(self, folder, files):
+    def __init__(self, folder, files, programs):
         self._block, self._log = files / "block.sh", files / "log.txt"
-        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        path = os.pathsep.join([*programs, str(Path(sys.executable).parent), os.environ["PATH"]])
         self._bash = subprocess.Popen(
             ["bash"],
             stdin=subprocess.PIPE,
@@ -72,10 +76,10 @@ class Terminal:
         self._bash.wait()
 
 
-def follow(page, folder, files):
-    """Runs every block of a page, from a folder on."""
+def follow(page, folder, files, programs=()):
+    """Runs every block of a page, from a folder on, with folders of programs first on the path."""
     namespace = {"__name__": "__main__"}
-    with contextlib.closing(Terminal(folder, files)) as terminal:
+    with contextlib.closing(Terminal(folder, files, programs)) as terminal:
         for block in blocks(page.read_text(encoding="utf-8")):
             if block.not_run:
                 continue
@@ -86,10 +90,17 @@ def follow(page, folder, files):
                 exec(compile(source, str(page), "exec"), namespace)
 
 
+@pytest.fixture(scope="session")
+def warm(tmp_path_factory):
+    with contextlib.closing(WarmCoramp(tmp_path_factory.mktemp("warm"))) as coramp:
+        yield str(coramp.folder)
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_page_runs(page, tmp_path, tmp_path_factory, monkeypatch):
+def test_page_runs(page, tmp_path, tmp_path_factory, monkeypatch, warm):
     monkeypatch.chdir(tmp_path)
-    follow(page, tmp_path, tmp_path_factory.mktemp("terminal"))
+    programs = () if page == TUTORIAL else (warm,)
+    follow(page, tmp_path, tmp_path_factory.mktemp("terminal"), programs)
 
 
 def test_a_page_is_followed_in_one_terminal(tmp_path, tmp_path_factory, monkeypatch):

@@ -220,16 +220,27 @@ def quick_guard(monkeypatch):
 
 
 @pytest.mark.parametrize(("mistake", "told"), MISTAKES)
-def test_a_mistake_fails_its_own_runs_only(mistake, told, tmp_path, quick_guard):
+def test_a_mistake_ends_its_run_with_a_line_that_tells_it(mistake, told, quick_guard):
     wrong = strategy_that_is(mistake)
     coramp.register(wrong)
+    flows = {"mainline_veh_h": 1300, "ramp_veh_h": 600}
+    with pytest.raises(CorampError) as failed:
+        coramp.run("paper", wrong.name, engine="exact", horizon_s=60, **flows)
+    (error,) = failed.value.messages
+    assert error.startswith(f"strategy {wrong.name}: at ")
+    assert told in error
+    assert "\n" not in error
+
+
+@pytest.mark.parametrize("mistake", [raising, busy_and_swallowing_everything, leaving])
+def test_a_mistake_fails_its_own_runs_only(mistake, tmp_path, quick_guard):
+    wrong = strategy_that_is(mistake)
+    coramp.register(wrong, replace=True)
     (tmp_path / "s.toml").write_text(STUDY.format(name=wrong.name))
     study = coramp.study(str(tmp_path / "s.toml"), seeds=2, jobs=1, out=tmp_path / "out")
     assert study.failed["strategy"].to_list() == [wrong.name] * 2
-    for error in study.failed["error"]:
-        assert error.startswith(f"strategy {wrong.name}: at ")
-        assert told in error
-        assert "\n" not in error
+    told = dict(MISTAKES)[mistake]
+    assert all(told in error for error in study.failed["error"])
     assert study.runs.filter(status="ok")["strategy"].to_list() == ["mainline-priority"] * 2
 
 

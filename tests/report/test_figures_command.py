@@ -180,7 +180,11 @@ def test_what_is_not_given_is_run_in_the_exact_engine_below_the_figures(
         asked.append((name, seeds, jobs, engine, out))
         shutil.copytree(studies[name], out)
 
+    def not_drawn(figure, path):
+        return path
+
     monkeypatch.setattr(coramp.api, "study", study)
+    monkeypatch.setattr(coramp.report.figures, "save_figure", not_drawn)
     drawn = coramp.api.figures(tmp_path / "out", seeds=2, jobs=1)
     kept = tmp_path / "out" / "study"
     assert asked == [(name, 2, 1, "exact", kept / name) for name in ("paper", "sensitivity")]

@@ -203,8 +203,7 @@ def test_the_keyboard_reaches_a_vehicles_decision(browser, folders):
 
 
 @in_browser
-@pytest.mark.parametrize("colours", ["light", "dark"])
-@pytest.mark.parametrize("width", [375, 1100])
+@pytest.mark.parametrize(("width", "colours"), [(375, "dark"), (1100, "light")])
 def test_pages_are_for_everyone(browser, folders, colours, width):
     for path in (report(folders / "study"), replay(folders / "uncontrolled")):
         with opened(browser, path.as_uri(), width, color_scheme=colours) as page:

@@ -14,12 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.optimize as untyped_optimize
-from scipy.stats import qmc
 
 from coramp._kernel import BoolArray, FloatArray
-
-optimize: Any = untyped_optimize
 
 RIDGE = 1e-2
 """Weight against steep functions, in units of one run's: it decides what runs leave open."""
@@ -192,6 +188,8 @@ def search(
     ``simulate`` gives one row of numbers for each row of places. The surrogate and all runs come
     with it.
     """
+    from scipy.stats import qmc  # takes a second, and most commands do not search
+
     dimensions, usual = len(axes), np.array([axis.usual_share for axis in axes])
     centre = np.full(dimensions, 0.5)
     places, numbers = np.empty((0, dimensions)), np.empty((0, len(wanted.numbers)))
@@ -227,6 +225,9 @@ def _nearest_runs(runs: Runs, measured: FloatArray, floor: FloatArray) -> FloatA
 def _least(
     surrogate: Surrogate, wanted: Wanted, usual: FloatArray, half_width: float
 ) -> FloatArray:
+    import scipy.optimize as untyped_optimize
+
+    optimize: Any = untyped_optimize
     low = np.clip(surrogate.centre - half_width, 0.0, 1.0)
     high = np.clip(surrogate.centre + half_width, 0.0, 1.0)
     found = optimize.differential_evolution(

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.optimize as untyped_optimize
 
 from coramp._kernel import FloatArray
 from coramp.strategies.base import Decision, Memory, View
 from coramp.strategies.parameters import parameter
 from coramp.strategies.sequence import Crossings, decide_in_sequence
 
-optimize: Any = untyped_optimize
 SPARE_S = (0.0, 1e-5, 2e-5, 5e-5, 1e-4)
 """HiGHS now and then refuses its own optimum, which lies just at its tolerance; then all gaps are
 asked to be larger by the next of these."""
@@ -117,6 +115,9 @@ class MilpSequence:
 def _solution(
     earliest_s: FloatArray, choices: int, longest_s: float, rows: FloatArray, least: FloatArray
 ) -> FloatArray | None:
+    import scipy.optimize as untyped_optimize  # takes 0.3 s, and no other strategy needs it
+
+    optimize: Any = untyped_optimize
     times = len(earliest_s)
     found = optimize.milp(
         np.concatenate([np.ones(times), np.zeros(choices)]),

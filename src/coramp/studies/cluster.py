@@ -4,14 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import joblib as untyped_joblib
-
 from coramp.coordination.time_limit import TooLong, time_limit
 from coramp.errors import CorampError
 from coramp.records.schemas import RESULT_VERSION
 from coramp.runs.running import versions
-
-joblib: Any = untyped_joblib
 
 ANSWER_S = 10
 """How long a scheduler, and its first worker, may take to answer."""
@@ -47,6 +43,9 @@ def connected(address: str) -> Iterator[int]:
             f"--cluster: {address}: what answers there is no Dask scheduler "
             f"({type(error).__name__}); allowed is an address like tcp://host:8786"
         ) from error
+    import joblib as untyped_joblib
+
+    joblib: Any = untyped_joblib
     with client:
         _check_workers(client, address)
         with joblib.parallel_config(backend="dask"):

@@ -9,8 +9,6 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from scipy.special import gammaincinv
-
 from coramp.studies.statistics import CONFIDENCE
 
 
@@ -67,4 +65,6 @@ def weighted_rate(
 
 def _gamma_quantile(mean: float, variance: float, probability: float) -> float:
     """The quantile of the gamma distribution with a mean and a variance."""
+    from scipy.special import gammaincinv
+
     return float(gammaincinv(mean**2 / variance, probability)) * variance / mean

@@ -8,9 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import joblib as untyped_joblib
-from joblib.externals.loky.process_executor import TerminatedWorkerError
-
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
 from coramp.runs.corridor_rows import corridor_row, failed_corridor_row, site_rows
@@ -19,8 +16,6 @@ from coramp.runs.running import RunSpec, execute, failed_row
 from coramp.studies.breakdown import Bisection
 from coramp.studies.definition import sort_key
 from coramp.studies.store import Part, Store
-
-joblib: Any = untyped_joblib
 
 ALL_WORKERS = -1
 """As a number of jobs: whatever the cluster has."""
@@ -155,6 +150,8 @@ def _results(specs: Sequence[AnySpec], jobs: int) -> Results:
     Where a worker dies, what it had not done is run again; what is left after some deaths runs
     in workers of its own, so that a run which kills its worker fails alone.
     """
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
     left = {spec.run_id: spec for spec in specs}
     for _ in range(DEATHS_BEFORE_ISOLATION):
         if not left:
@@ -174,6 +171,9 @@ def _results(specs: Sequence[AnySpec], jobs: int) -> Results:
 
 
 def _in_workers(specs: Sequence[AnySpec], jobs: int) -> Iterator[Part]:
+    import joblib as untyped_joblib
+
+    joblib: Any = untyped_joblib
     parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
     yield from parallel(joblib.delayed(execute_part)(spec) for spec in specs)
 

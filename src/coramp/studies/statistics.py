@@ -4,8 +4,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from scipy.special import gammaincinv, stdtrit
-
 CONFIDENCE = 0.95
 
 
@@ -26,6 +24,8 @@ def estimate(values: Sequence[float]) -> Estimate:
     if n == 1:
         return Estimate(mean, math.nan, 1)
     variance = math.fsum((value - mean) ** 2 for value in values) / (n - 1)
+    from scipy.special import stdtrit
+
     quantile = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2.0))
     return Estimate(mean, quantile * math.sqrt(variance / n), n)
 
@@ -60,6 +60,8 @@ def rate_interval(count: int, exposure: float) -> tuple[float, float]:
     Where nothing was counted it is 0 to the one-sided 95 % limit, -ln 0.05 / exposure, which is the
     rule of three. Nan without exposure.
     """
+    from scipy.special import gammaincinv
+
     if exposure <= 0.0:
         return math.nan, math.nan
     if count == 0:
