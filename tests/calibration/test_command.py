@@ -97,7 +97,7 @@ def test_a_hidden_time_gap_is_found_by_few_runs(road, tmp_path, monkeypatch):
     effort = Effort(12, 6, 2, speed_runs=3, fit_runs=1)
     effort = effort.told_to(lambda *done: told.append(done))
     found, origin = calibrated(str(road), counts, Asked(date="2026-01-02"), effort)
-    assert told[-1] == (25, 25)
+    assert told[-1] == (19, 19)
     assert found.notes == ()
     assert found.drivers.tau_s == pytest.approx(1.5, abs=0.08)
     assert found.drivers.speed_factor.mean == pytest.approx(0.95, rel=0.01)

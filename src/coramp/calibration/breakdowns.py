@@ -6,7 +6,7 @@ from coramp.calibration.moments import onset_s
 from coramp.calibration.series import Series, queues_of
 from coramp.calibration.site import Site
 
-BEFORE_S, AFTER_S = 1800.0, 1200.0
+BEFORE_S, AFTER_S = 3600.0, 1200.0
 """How much of the data before and after a breakdown is driven again by candidates."""
 LEAST_BEFORE_S = 600.0
 MOST = 8

@@ -25,8 +25,9 @@ FREE_SHARE = 0.85
 USUAL_DEVIATION, DEVIATIONS = 0.07, (0.002, 0.15)
 """Spread of desired speeds over v0: that of ``credible``, which is near by if the data does not
 tell, and in which range it is looked for."""
-AROUND, NEAR = (0.97, 1.12), (0.95, 1.05)
+AROUND, NEAR = (0.97, 1.2), (0.92, 1.12)
 """The range of the mean of desired speeds, over that of measured speeds, and over one found."""
+MEAN, DEVIATION = "mean of desired speeds", "deviation of desired speeds"
 LEAST_NOISE = (0.02, 0.02, 0.05)
 
 
@@ -44,21 +45,15 @@ class FreeTraffic:
     more: BoolArray
     detectors: tuple[str, ...]
 
-    def fitted(self, drivers: DriverPopulation, effort: Effort, near: bool) -> DriverPopulation:
+    def fitted(self, drivers: DriverPopulation, effort: Effort) -> DriverPopulation:
         """Returns drivers whose simulated free speeds are nearest to those measured.
 
         On one lane nobody overtakes: measured speeds are lower than desired ones, the more so the
         denser traffic is and the more desired speeds differ, and they differ by platoons. So mean
-        and spread of desired speeds are looked for together. With ``near`` that is near those which
-        drivers have.
+        and spread of desired speeds are looked for together.
         """
         v0 = self.replayed.scenario.mainline.speed_mps
-        factor = drivers.speed_factor or speed_factor(self.told.mean_mps / v0, USUAL_DEVIATION)
-        around = NEAR if near else AROUND
-        axes = (
-            Axis("mean", factor.mean * around[0], factor.mean * around[1]),
-            Axis("deviation", *DEVIATIONS, usual=USUAL_DEVIATION),
-        )
+        axes = speed_axes(self.told.mean_mps / v0, AROUND)
         made = 0
 
         def simulate(places: FloatArray) -> FloatArray:
@@ -66,7 +61,7 @@ class FreeTraffic:
             runs = []
             for place in places.tolist():
                 seed = 1 + made % effort.seeds
-                runs.append((self.replayed, _wishing(drivers, axes, place), seed))
+                runs.append((self.replayed, at_place(drivers, axes, place), seed))
                 made += 1
             return np.array([self._numbers(run) for run in driven_again(runs, effort)])
 
@@ -74,7 +69,7 @@ class FreeTraffic:
         rounds = (Round(count, 0.5, 1.0), Round(count, 0.25, 0.3))
         measured = Wanted(self._numbers(self.replayed.measured))
         place, _, _ = search(axes, rounds, simulate, measured, np.array(LEAST_NOISE))
-        return _wishing(drivers, axes, place.tolist())
+        return at_place(drivers, axes, place.tolist())
 
     def _numbers(self, series: Series) -> FloatArray:
         """Mean speeds (m/s) with little and with more traffic, and the logarithm of the spread."""
@@ -86,11 +81,22 @@ class FreeTraffic:
         return np.array([low.mean_mps, high.mean_mps, spread])
 
 
-def _wishing(
+def speed_axes(factor: float, around: tuple[float, float]) -> tuple[Axis, Axis]:
+    """Returns mean and spread of desired speeds over v0 as axes, the mean ``around`` a factor."""
+    low, high = around
+    return (
+        Axis(MEAN, factor * low, factor * high),
+        Axis(DEVIATION, *DEVIATIONS, usual=USUAL_DEVIATION),
+    )
+
+
+def at_place(
     drivers: DriverPopulation, axes: Sequence[Axis], place: Sequence[float]
 ) -> DriverPopulation:
-    mean, deviation = (axis.value(share) for axis, share in zip(axes, place, strict=True))
-    return drivers.model_copy(update={"speed_factor": speed_factor(mean, deviation)})
+    """Returns drivers with the parameters of a place in the unit cube; others are kept."""
+    values = {axis.name: axis.value(share) for axis, share in zip(axes, place, strict=True)}
+    factor = speed_factor(values.pop(MEAN), values.pop(DEVIATION))
+    return drivers.model_copy(update={**values, "speed_factor": factor})
 
 
 def free_traffic(
