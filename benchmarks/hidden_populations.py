@@ -163,6 +163,7 @@ def measured(place, hidden, mornings, effort):
     return {
         "hidden": hidden.name,
         "mornings": mornings,
+        "begins": (hidden.flows.mainline + hidden.flows.ramp) / np.nanmean(capacity[0]),
         "capacity": np.nanmean(capacity[0]),
         "error": np.nanstd(capacity[0], ddof=1) / np.sqrt(np.isfinite(capacity[0]).sum()),
         "found": np.nanmean(capacity[1]),
@@ -180,7 +181,8 @@ def measured(place, hidden, mornings, effort):
 def line_of(row):
     """Returns a row of the table in Markdown."""
     return (
-        f"| {row['hidden']} | {row['mornings']} | {row['capacity']:.0f} ± {row['error']:.0f} "
+        f"| {row['hidden']} | {row['mornings']} | {100 * row['begins']:.0f} "
+        f"| {row['capacity']:.0f} ± {row['error']:.0f} "
         f"| {row['found']:.0f} | {100 * row['off']:+.1f} | {row['broke']} of {row['of']} "
         f"| {row['free']:.2f} | {100 * row['free_off']:+.2f} | {100 * row['desired_off']:+.2f} "
         f"| {row['took_s']:.0f} |"
@@ -188,9 +190,9 @@ def line_of(row):
 
 
 HEAD = """\
-| hidden | mornings | capacity (veh/h) | found | off by (%) | broke down | free speed (m/s) \
-| off by (%) | desired speed off by (%) | took (s) |
-|---|---|---|---|---|---|---|---|---|---|"""
+| hidden | mornings | begins at (% of capacity) | capacity (veh/h) | found | off by (%) \
+| broke down | free speed (m/s) | off by (%) | desired speed off by (%) | took (s) |
+|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
 def drivers_of(model, tau_s, accel_mps2, speed, **rest):
