@@ -180,7 +180,7 @@ def counts_of(rows):
         ([("M1", 20, 19.0), ("R1", 3, 16.0)], "none lies on the mainline at 200 m or further"),
         (
             [("M1", 2, 19.0), ("M2", 2, 19.0), ("M3", 3, 19.0), ("R1", 1, 16.0)],
-            "vehicles passed while traffic was free; calibration needs 100",
+            "vehicles passed while traffic was free; calibration needs 50",
         ),
         (
             [("M1", 20, None), ("M2", 20, None), ("M3", 23, None), ("R1", 3, None)],

@@ -6,7 +6,7 @@ import pytest
 
 from coramp.calibration.breakdowns import windows_of
 from coramp.calibration.demand import saturated
-from coramp.calibration.desired_speeds import free_intervals
+from coramp.calibration.desired_speeds import free_intervals, rough_free_mps
 from coramp.calibration.fit import fit_of, geh
 from coramp.calibration.free_speed import free_speed
 from coramp.calibration.moments import Free, free_halves, moments_of, names_of_moments, onset_s
@@ -87,7 +87,9 @@ def test_each_breakdown_is_a_window_of_its_own():
     assert [(w.begin_s, w.end_s) for w in windows] == [(600.0, 2700.0), (2700.0, 6000.0)]
     assert [onset_s(window, SITE, 20.0) for window in windows] == [1500.0, 4800.0]
     assert windows_of(five_minutes([20.0] * 4, [1] * 4), SITE, 20.0) == []
-    at_once = five_minutes([20.0, 5.0, 5.0, 5.0], [1] * 4)
+    soon = windows_of(five_minutes([20.0, 5.0, 5.0, 5.0], [1] * 4), SITE, 20.0)
+    assert [(w.begin_s, w.end_s) for w in soon] == [(600.0, 1800.0)]
+    at_once = five_minutes([5.0, 5.0, 5.0, 20.0], [1] * 4)
     assert windows_of(at_once, SITE, 20.0) == []
 
 
@@ -170,6 +172,17 @@ def test_spread_of_drivers_shows_in_means_of_few():
     many = Series(0.0, 60.0, {"a": np.full(6, 4.0)}, {"a": np.array([19.0, 21.0] * 3)})
     found = free_speed(many, ["a"], np.ones(6, np.bool_))
     assert found.deviation_mps == pytest.approx(np.sqrt(6 * 4.0 / 5))
+
+
+def test_free_speed_is_told_however_long_the_queue_stands():
+    """The fastest 5 min are 20 m/s; the median of what is at least 15 m/s is 19 m/s."""
+    up = [20.0, 19.0, 18.0, *([5.0] * 20)]
+    assert rough_free_mps(five_minutes(up, [9] * 23), "up") == 19.0
+    lone = five_minutes([40.0, 20.0, 18.0, 5.0], [9] * 4)
+    lone.vehicles["up"][0] = 1.0  # one fast driver is not all of them
+    assert rough_free_mps(lone, "up") == 20.0
+    lone.vehicles["up"][:] = 1.0
+    assert rough_free_mps(lone, "up") == 40.0
 
 
 def test_free_is_not_much_traffic_without_a_queue():

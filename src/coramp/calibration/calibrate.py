@@ -8,6 +8,7 @@ import numpy as np
 from coramp._kernel import FloatArray
 from coramp.calibration.breakdowns import LEAST_BEFORE_S, windows_of
 from coramp.calibration.desired_speeds import (
+    LEAST_VEHICLES,
     NEAR,
     USUAL_DEVIATION,
     at_place,
@@ -28,10 +29,6 @@ from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 
-QUANTILE = 0.8
-"""A fifth of the intervals upstream are faster than about free."""
-LEAST_VEHICLES = 100
-"""With fewer vehicles the mean of their speeds is off by 1 % or more."""
 ROUNDS = (
     (0.37, 0.5, 0.3),
     (0.21, 0.3, 0.25),
@@ -67,14 +64,14 @@ def calibrate_series(
     desired ones as much as on how drivers follow. Raises CorampError where data is too little for
     the first.
     """
-    rough_mps = rough_free_mps(data, site.upstream.id, QUANTILE)
+    rough_mps = rough_free_mps(data, site.upstream.id)
     onset = onset_s(data, site, rough_mps)
     if onset <= data.begin_s:
         raise CorampError(
             f"detector {site.upstream.id}: stands in a queue when the data begins; allowed is data "
             "that begins with free traffic"
         )
-    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id, 0.5)
+    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id)
     free = free_traffic(scenario, site, data, onset, (rough_mps, ramp_mps))
     if free.told.vehicles < LEAST_VEHICLES:
         raise CorampError(
