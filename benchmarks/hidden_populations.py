@@ -12,7 +12,7 @@ What was simulated is kept in the folder ``--kept``, so that an interrupted meas
 import argparse
 import hashlib
 import math
-import time
+import os
 from concurrent.futures import ThreadPoolExecutor
 from importlib.resources import files
 from pathlib import Path
@@ -150,12 +150,12 @@ def morning_file(place, hidden, mornings):
 def measured(place, hidden, mornings, effort):
     """Calibrates to the data of a hidden population; returns a row of the table."""
     data = morning_file(place, hidden, mornings)
-    began_s = time.monotonic()
+    before_s = sum(os.times()[:4])
     with CalibrationProgress(effort.total, effort.jobs) as progress:
         told = effort.told_to(progress)
         road = str(place.road(hidden.scenario))
         found, _ = calibrated(road, data, Asked(hidden.model), told)
-    took_s = time.monotonic() - began_s
+    took_s = sum(os.times()[:4]) - before_s
     both = (hidden.drivers, found.drivers)
     capacity = [capacities_veh_h(place, hidden, drivers) for drivers in both]
     speed = [free_mps(place, hidden, drivers) for drivers in both]
@@ -163,6 +163,7 @@ def measured(place, hidden, mornings, effort):
     return {
         "hidden": hidden.name,
         "mornings": mornings,
+        "begins": (hidden.flows.mainline + hidden.flows.ramp) / np.nanmean(capacity[0]),
         "capacity": np.nanmean(capacity[0]),
         "error": np.nanstd(capacity[0], ddof=1) / np.sqrt(np.isfinite(capacity[0]).sum()),
         "found": np.nanmean(capacity[1]),
@@ -180,7 +181,8 @@ def measured(place, hidden, mornings, effort):
 def line_of(row):
     """Returns a row of the table in Markdown."""
     return (
-        f"| {row['hidden']} | {row['mornings']} | {row['capacity']:.0f} ± {row['error']:.0f} "
+        f"| {row['hidden']} | {row['mornings']} | {100 * row['begins']:.0f} "
+        f"| {row['capacity']:.0f} ± {row['error']:.0f} "
         f"| {row['found']:.0f} | {100 * row['off']:+.1f} | {row['broke']} of {row['of']} "
         f"| {row['free']:.2f} | {100 * row['free_off']:+.2f} | {100 * row['desired_off']:+.2f} "
         f"| {row['took_s']:.0f} |"
@@ -188,9 +190,9 @@ def line_of(row):
 
 
 HEAD = """\
-| hidden | mornings | capacity (veh/h) | found | off by (%) | broke down | free speed (m/s) \
-| off by (%) | desired speed off by (%) | took (s) |
-|---|---|---|---|---|---|---|---|---|---|"""
+| hidden | mornings | begins at (% of capacity) | capacity (veh/h) | found | off by (%) \
+| broke down | free speed (m/s) | off by (%) | desired speed off by (%) | processor time (s) |
+|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
 def drivers_of(model, tau_s, accel_mps2, speed, **rest):

@@ -6,10 +6,10 @@ import pytest
 
 from coramp.calibration.breakdowns import windows_of
 from coramp.calibration.demand import saturated
-from coramp.calibration.desired_speeds import free_intervals
+from coramp.calibration.desired_speeds import free_intervals, rough_free_mps
 from coramp.calibration.fit import fit_of, geh
 from coramp.calibration.free_speed import free_speed
-from coramp.calibration.moments import moments_of, names_of_moments, onset_s
+from coramp.calibration.moments import Free, free_halves, moments_of, names_of_moments, onset_s
 from coramp.calibration.series import (
     Series,
     breakdown_of,
@@ -84,10 +84,12 @@ def test_each_breakdown_is_a_window_of_its_own():
     series = five_minutes(up, range(len(up)))
     assert queues_of(series, "up", 20.0) == [(3, 7), (14, 17)]
     windows = windows_of(series, SITE, 20.0)
-    assert [(w.begin_s, w.end_s) for w in windows] == [(600.0, 2700.0), (3000.0, 6000.0)]
+    assert [(w.begin_s, w.end_s) for w in windows] == [(600.0, 2700.0), (2700.0, 6000.0)]
     assert [onset_s(window, SITE, 20.0) for window in windows] == [1500.0, 4800.0]
     assert windows_of(five_minutes([20.0] * 4, [1] * 4), SITE, 20.0) == []
-    at_once = five_minutes([20.0, 5.0, 5.0, 5.0], [1] * 4)
+    soon = windows_of(five_minutes([20.0, 5.0, 5.0, 5.0], [1] * 4), SITE, 20.0)
+    assert [(w.begin_s, w.end_s) for w in soon] == [(600.0, 1800.0)]
+    at_once = five_minutes([5.0, 5.0, 5.0, 20.0], [1] * 4)
     assert windows_of(at_once, SITE, 20.0) == []
 
 
@@ -105,8 +107,14 @@ def test_capacity_is_the_highest_flow_before():
     assert capacity_veh_h(free, "up", "down", 20.0) is None
 
 
+def told_of(series, free=None):
+    halves = free_halves(series, SITE, 20.0) if free is None else free
+    names = names_of_moments(SITE)
+    return dict(zip(names, moments_of(series, SITE, 20.0, halves), strict=True))
+
+
 def test_moments_of_a_breakdown():
-    found = dict(zip(names_of_moments(SITE), moments_of(BROKEN, SITE, 20.0), strict=True))
+    found = told_of(BROKEN)
     speeds = {name.split()[2] for name in found if name.startswith("speed")}
     assert speeds == {"up", "down"}  # where vehicles have just entered they tell little of drivers
     assert found["breakdown time (s)"] == 1800.0
@@ -114,21 +122,46 @@ def test_moments_of_a_breakdown():
     assert found["highest flow of 10 min before (veh/h)"] == (12 + 11) / 2 * 12.0
     assert found["discharge (veh/h)"] == 84.0
     assert found["ramp's share of the discharge"] == 0.25
-    assert found["speed at up before (m/s)"] == pytest.approx((20.0 + 19.0 + 14.9 + 20.0) / 4)
     assert found["speed at up after (m/s)"] == pytest.approx(4.5)
-    free = moments_of(five_minutes([20.0] * 4, [5, 6, 7, 8]), SITE, 20.0)
-    assert free[0] == 600.0 + 1200.0
-    assert free[1:4].tolist() == [8 * 12.0, 7.5 * 12.0, 130 * 12.0]
-    assert np.isnan(free[4])
+    free = told_of(five_minutes([20.0] * 4, [5, 6, 7, 8]))
+    assert free["breakdown time (s)"] == 600.0 + 1200.0
+    assert free["highest flow before (veh/h)"] == 8 * 12.0
+    assert free["highest flow of 10 min before (veh/h)"] == 7.5 * 12.0
+    assert free["flow that comes in the 10 min before (veh/h)"] == 130 * 12.0
+    assert np.isnan(free["discharge (veh/h)"])
+
+
+def test_free_traffic_is_told_by_flow_and_without_queues():
+    counts = np.array([80.0, 90.0, 70.0, 100.0, 60.0, 60.0, 60.0, 60.0])
+    vehicles = {**BROKEN.vehicles, "in": counts}
+    series = Series(BROKEN.begin_s, BROKEN.interval_s, vehicles, BROKEN.speed_mps)
+    halves = free_halves(series, SITE, 20.0)
+    # of the four intervals before the breakdown the third has a queue; the median is 90
+    assert halves.little.tolist() == [1, 1, 0, 0, 0, 0, 0, 0]
+    assert halves.more.tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+    found = told_of(series, halves)
+    assert found["speed at up with little traffic (m/s)"] == pytest.approx(19.5)
+    assert found["speed at up with more traffic (m/s)"] == pytest.approx(20.0)
+    assert np.isnan(found["at up: logarithm of the spread"])  # of three intervals
+    # of a run that breaks down earlier its own free intervals count alone
+    early = five_minutes([20.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0], [9] * 8)
+    found = told_of(early, halves)
+    assert found["speed at up with little traffic (m/s)"] == 20.0
+    assert np.isnan(found["speed at up with more traffic (m/s)"])
+    many = Free(np.ones(8, np.bool_), np.zeros(8, np.bool_))
+    waves = five_minutes([19.0, 21.0] * 4, [9] * 8)  # s^2 = 100 * 8 / 7 with 100 vehicles each
+    spread = told_of(waves, many)["at up: logarithm of the spread"]
+    assert spread == pytest.approx(0.5 * np.log(800.0 / 7.0))
 
 
 def test_what_comes_in_the_last_10_min_before_the_breakdown():
     vehicles = {**BROKEN.vehicles, "up": np.arange(8.0), "ramp": np.arange(0.0, 80.0, 10.0)}
     series = Series(BROKEN.begin_s, BROKEN.interval_s, vehicles, BROKEN.speed_mps)
-    found = dict(zip(names_of_moments(SITE), moments_of(series, SITE, 20.0), strict=True))
+    found = told_of(series)
     assert found["flow that comes in the 10 min before (veh/h)"] == (2 + 3 + 20 + 30) / 2 * 12.0
-    short = moments_of(BROKEN.between(600.0, 900.0), SITE, 20.0)
-    assert np.isnan(short[2:4]).all()
+    short = told_of(BROKEN.between(600.0, 900.0))
+    assert np.isnan(short["highest flow of 10 min before (veh/h)"])
+    assert np.isnan(short["flow that comes in the 10 min before (veh/h)"])
 
 
 def test_spread_of_drivers_shows_in_means_of_few():
@@ -139,6 +172,17 @@ def test_spread_of_drivers_shows_in_means_of_few():
     many = Series(0.0, 60.0, {"a": np.full(6, 4.0)}, {"a": np.array([19.0, 21.0] * 3)})
     found = free_speed(many, ["a"], np.ones(6, np.bool_))
     assert found.deviation_mps == pytest.approx(np.sqrt(6 * 4.0 / 5))
+
+
+def test_free_speed_is_told_however_long_the_queue_stands():
+    """The fastest 5 min are 20 m/s; the median of what is at least 15 m/s is 19 m/s."""
+    up = [20.0, 19.0, 18.0, *([5.0] * 20)]
+    assert rough_free_mps(five_minutes(up, [9] * 23), "up") == 19.0
+    lone = five_minutes([40.0, 20.0, 18.0, 5.0], [9] * 4)
+    lone.vehicles["up"][0] = 1.0  # one fast driver is not all of them
+    assert rough_free_mps(lone, "up") == 20.0
+    lone.vehicles["up"][:] = 1.0
+    assert rough_free_mps(lone, "up") == 40.0
 
 
 def test_free_is_not_much_traffic_without_a_queue():

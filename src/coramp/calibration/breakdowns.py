@@ -6,15 +6,15 @@ from coramp.calibration.moments import onset_s
 from coramp.calibration.series import Series, queues_of
 from coramp.calibration.site import Site
 
-BEFORE_S, AFTER_S = 1800.0, 1200.0
+BEFORE_S, AFTER_S = 3600.0, 1200.0
 """How much of the data before and after a breakdown is driven again by candidates."""
-LEAST_BEFORE_S = 600.0
+LEAST_BEFORE_S = 180.0
 MOST = 8
 """More breakdowns than these tell little more."""
 
 
 def windows_of(data: Series, site: Site, free_mps: float) -> list[Series]:
-    """Returns the data around each breakdown before which traffic was free for 10 min or longer."""
+    """Returns the data around each breakdown before which traffic was free for 3 min or longer."""
     found = []
     for before in _from_queue_to_queue(data, site, free_mps):
         onset = onset_s(before, site, free_mps)

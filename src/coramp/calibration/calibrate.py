@@ -7,12 +7,20 @@ import numpy as np
 
 from coramp._kernel import FloatArray
 from coramp.calibration.breakdowns import LEAST_BEFORE_S, windows_of
-from coramp.calibration.desired_speeds import USUAL_DEVIATION, free_traffic, rough_free_mps
+from coramp.calibration.desired_speeds import (
+    LEAST_VEHICLES,
+    NEAR,
+    USUAL_DEVIATION,
+    at_place,
+    free_traffic,
+    rough_free_mps,
+    speed_axes,
+)
 from coramp.calibration.effort import Effort
 from coramp.calibration.fit import Fit, fit_of
 from coramp.calibration.free_speed import FreeSpeed
 from coramp.calibration.models import AXES, speed_factor, usual_population
-from coramp.calibration.moments import moments_of, names_of_moments, onset_s
+from coramp.calibration.moments import Free, free_halves, moments_of, names_of_moments, onset_s
 from coramp.calibration.replayed import Replayed, driven_again
 from coramp.calibration.search import Axis, Wanted, rounds_of, search
 from coramp.calibration.series import Series, breakdown_of
@@ -21,10 +29,6 @@ from coramp.errors import CorampError
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 
-QUANTILE = 0.8
-"""A fifth of the intervals upstream are faster than about free."""
-LEAST_VEHICLES = 100
-"""With fewer vehicles the mean of their speeds is off by 1 % or more."""
 ROUNDS = (
     (0.37, 0.5, 0.3),
     (0.21, 0.3, 0.25),
@@ -33,7 +37,7 @@ ROUNDS = (
     (0.13, 0.13, 0.15),
 )
 """Share of the runs, half width and reach of each round: each comes nearer."""
-LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01}
+LEAST_NOISE = {"(s)": 60.0, "(veh/h)": 8.0, "(m/s)": 0.04, "discharge": 0.01, "spread": 0.05}
 """Least noise of the numbers that the search compares, by what their names end in."""
 
 
@@ -55,17 +59,19 @@ def calibrate_series(
 ) -> Calibrated:
     """Returns the population of a model that fits data of detectors best.
 
-    Desired speeds come first, from free traffic; then all that shows in how the merge breaks down;
-    then desired speeds once more. Raises CorampError where data is too little for the first.
+    Desired speeds of usual drivers come first, from free traffic; then all parameters together,
+    from free traffic and from how the merge breaks down: where nobody is alone, speeds depend on
+    desired ones as much as on how drivers follow. Raises CorampError where data is too little for
+    the first.
     """
-    rough_mps = rough_free_mps(data, site.upstream.id, QUANTILE)
+    rough_mps = rough_free_mps(data, site.upstream.id)
     onset = onset_s(data, site, rough_mps)
     if onset <= data.begin_s:
         raise CorampError(
             f"detector {site.upstream.id}: stands in a queue when the data begins; allowed is data "
             "that begins with free traffic"
         )
-    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id, 0.5)
+    ramp_mps = rough_free_mps(data.between(data.begin_s, onset), site.ramp_entry.id)
     free = free_traffic(scenario, site, data, onset, (rough_mps, ramp_mps))
     if free.told.vehicles < LEAST_VEHICLES:
         raise CorampError(
@@ -80,12 +86,12 @@ def calibrate_series(
             f"it is taken to be about {100 * USUAL_DEVIATION:g} %"
         )
     usual = speed_factor(told.mean_mps / scenario.mainline.speed_mps, USUAL_DEVIATION)
-    drivers = free.fitted(usual_population(model, usual), effort, near=False)
+    drivers = free.fitted(usual_population(model, usual), effort)
     if not windows:
         return Calibrated(drivers, told, None, tuple(notes))
     replays = [Replayed(scenario, site, w, (told.mean_mps, ramp_mps)) for w in windows]
-    drivers = _searched(replays, drivers, AXES[model], effort)
-    drivers = free.fitted(drivers, effort, near=True)
+    factor = drivers.speed_factor or usual
+    drivers = _searched(replays, drivers, (*AXES[model], *speed_axes(factor.mean, NEAR)), effort)
     turns = [replays[k % len(replays)] for k in range(effort.fit_runs)]
     made = driven_again([(turn, drivers, 1 + k) for k, turn in enumerate(turns)], effort)
     measured = [turn.measured for turn in turns]
@@ -106,6 +112,21 @@ def _unidentified(data: Series, site: Site, free_mps: float, onset: float) -> st
     )
 
 
+@dataclass(frozen=True)
+class _Breakdown:
+    """A measured breakdown that is driven again, and its intervals of free traffic."""
+
+    replayed: Replayed
+    free: Free
+
+    def off(self, run: Series) -> FloatArray:
+        """Returns by how much a run's numbers are more than those measured."""
+        return self._numbers(run) - self._numbers(self.replayed.measured)
+
+    def _numbers(self, series: Series) -> FloatArray:
+        return moments_of(series, self.replayed.site, self.replayed.free_mps[0], self.free)
+
+
 def _searched(
     replays: Sequence[Replayed],
     drivers: DriverPopulation,
@@ -117,26 +138,19 @@ def _searched(
     Runs go through the breakdowns by turns; what counts is how far they are off the measured one.
     """
     site, free_mps = replays[0].site, replays[0].free_mps[0]
-    measured = [moments_of(replayed.measured, site, free_mps) for replayed in replays]
+    breakdowns = [_Breakdown(one, free_halves(one.measured, site, free_mps)) for one in replays]
     made = 0
-
-    def at(place: FloatArray) -> DriverPopulation:
-        shares = zip(axes, place.tolist(), strict=True)
-        values = {axis.name: axis.value(share) for axis, share in shares}
-        return drivers.model_copy(update=values)
 
     def simulate(places: FloatArray) -> FloatArray:
         nonlocal made
-        numbers = range(made, made + len(places))
+        turns = [divmod(made + k, len(breakdowns)) for k in range(len(places))]
         made += len(places)
         runs = [
-            (replays[k % len(replays)], at(place), 1 + k // len(replays) % effort.seeds)
-            for k, place in zip(numbers, places, strict=True)
+            (replays[turn], at_place(drivers, axes, place), 1 + number % effort.seeds)
+            for (number, turn), place in zip(turns, places.tolist(), strict=True)
         ]
-        found = driven_again(runs, effort)
-        turns = [measured[k % len(replays)] for k in numbers]
-        told = [moments_of(run, site, free_mps) for run in found]
-        return np.array(told) - np.array(turns)
+        found = zip(turns, driven_again(runs, effort), strict=True)
+        return np.array([breakdowns[turn].off(run) for (_, turn), run in found])
 
     floor = [LEAST_NOISE[name.rsplit(" ", 1)[-1]] for name in names_of_moments(site)]
     place, _, _ = search(
@@ -146,4 +160,4 @@ def _searched(
         Wanted(np.zeros(len(floor)), len(replays)),
         np.array(floor),
     )
-    return at(place)
+    return at_place(drivers, axes, place.tolist())

@@ -14,7 +14,7 @@ from coramp.calibration.search import Axis, Round, Wanted, search
 from coramp.calibration.series import Series, queued
 from coramp.calibration.site import Site
 from coramp.errors import CorampError
-from coramp.metrics.queues import LOOP_M
+from coramp.metrics.queues import LOOP_M, QUEUE_SPEED
 from coramp.scenarios.demand_sections import Detector
 from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
@@ -22,11 +22,16 @@ from coramp.scenarios.sections import DriverPopulation
 FREE_S = 3600.0
 """How much of the data before a breakdown is driven again for desired speeds."""
 FREE_SHARE = 0.85
+LEAST_VEHICLES, ENOUGH_VEHICLES = 50, 100
+"""If desired speeds differ by 7 %, the mean of 50 drivers has a standard error of 1 %."""
 USUAL_DEVIATION, DEVIATIONS = 0.07, (0.002, 0.15)
 """Spread of desired speeds over v0: that of ``credible``, which is near by if the data does not
 tell, and in which range it is looked for."""
-AROUND, NEAR = (0.97, 1.12), (0.95, 1.05)
+AROUND, NEAR = (0.97, 1.2), (0.92, 1.12)
 """The range of the mean of desired speeds, over that of measured speeds, and over one found."""
+MEAN, DEVIATION = "mean of desired speeds", "deviation of desired speeds"
+FEW = 10
+"""The mean speed of fewer vehicles may be that of fast ones by chance."""
 LEAST_NOISE = (0.02, 0.02, 0.05)
 
 
@@ -44,21 +49,15 @@ class FreeTraffic:
     more: BoolArray
     detectors: tuple[str, ...]
 
-    def fitted(self, drivers: DriverPopulation, effort: Effort, near: bool) -> DriverPopulation:
+    def fitted(self, drivers: DriverPopulation, effort: Effort) -> DriverPopulation:
         """Returns drivers whose simulated free speeds are nearest to those measured.
 
         On one lane nobody overtakes: measured speeds are lower than desired ones, the more so the
         denser traffic is and the more desired speeds differ, and they differ by platoons. So mean
-        and spread of desired speeds are looked for together. With ``near`` that is near those which
-        drivers have.
+        and spread of desired speeds are looked for together.
         """
         v0 = self.replayed.scenario.mainline.speed_mps
-        factor = drivers.speed_factor or speed_factor(self.told.mean_mps / v0, USUAL_DEVIATION)
-        around = NEAR if near else AROUND
-        axes = (
-            Axis("mean", factor.mean * around[0], factor.mean * around[1]),
-            Axis("deviation", *DEVIATIONS, usual=USUAL_DEVIATION),
-        )
+        axes = speed_axes(self.told.mean_mps / v0, AROUND)
         made = 0
 
         def simulate(places: FloatArray) -> FloatArray:
@@ -66,7 +65,7 @@ class FreeTraffic:
             runs = []
             for place in places.tolist():
                 seed = 1 + made % effort.seeds
-                runs.append((self.replayed, _wishing(drivers, axes, place), seed))
+                runs.append((self.replayed, at_place(drivers, axes, place), seed))
                 made += 1
             return np.array([self._numbers(run) for run in driven_again(runs, effort)])
 
@@ -74,7 +73,7 @@ class FreeTraffic:
         rounds = (Round(count, 0.5, 1.0), Round(count, 0.25, 0.3))
         measured = Wanted(self._numbers(self.replayed.measured))
         place, _, _ = search(axes, rounds, simulate, measured, np.array(LEAST_NOISE))
-        return _wishing(drivers, axes, place.tolist())
+        return at_place(drivers, axes, place.tolist())
 
     def _numbers(self, series: Series) -> FloatArray:
         """Mean speeds (m/s) with little and with more traffic, and the logarithm of the spread."""
@@ -86,11 +85,22 @@ class FreeTraffic:
         return np.array([low.mean_mps, high.mean_mps, spread])
 
 
-def _wishing(
+def speed_axes(factor: float, around: tuple[float, float]) -> tuple[Axis, Axis]:
+    """Returns mean and spread of desired speeds over v0 as axes, the mean ``around`` a factor."""
+    low, high = around
+    return (
+        Axis(MEAN, factor * low, factor * high),
+        Axis(DEVIATION, *DEVIATIONS, usual=USUAL_DEVIATION),
+    )
+
+
+def at_place(
     drivers: DriverPopulation, axes: Sequence[Axis], place: Sequence[float]
 ) -> DriverPopulation:
-    mean, deviation = (axis.value(share) for axis, share in zip(axes, place, strict=True))
-    return drivers.model_copy(update={"speed_factor": speed_factor(mean, deviation)})
+    """Returns drivers with the parameters of a place in the unit cube; others are kept."""
+    values = {axis.name: axis.value(share) for axis, share in zip(axes, place, strict=True)}
+    factor = speed_factor(values.pop(MEAN), values.pop(DEVIATION))
+    return drivers.model_copy(update={**values, "speed_factor": factor})
 
 
 def free_traffic(
@@ -98,11 +108,14 @@ def free_traffic(
 ) -> FreeTraffic:
     """Returns the traffic before a queue began, or all where none did.
 
-    ``rough_mps`` are rough free speeds on mainline and ramp.
+    Where few vehicles come in light traffic, those in dense traffic count as well. ``rough_mps``
+    are rough free speeds on mainline and ramp.
     """
     names = tuple(loop.id for loop in speed_loops(site, scenario.mainline.start_m))
     before = data.between(onset_s - FREE_S, onset_s)
     free = free_intervals(before, site, rough_mps[0], onset_s < data.end_s)
+    if free_speed(before, names, free).vehicles < ENOUGH_VEHICLES:
+        free = ~queued(before, site.upstream.id, rough_mps[0])
     flows = before.vehicles[site.mainline_entry.id]
     little = free & (flows <= np.median(flows[free])) if free.any() else free
     told = free_speed(before, names, free)
@@ -127,15 +140,20 @@ def free_intervals(series: Series, site: Site, free_mps: float, broke: bool) -> 
     return free & ~queued(series, site.upstream.id, free_mps)
 
 
-def rough_free_mps(data: Series, detector: str, quantile: float) -> float:
-    """Returns a free speed to tell queues by: a quantile of the intervals' speeds.
+def rough_free_mps(data: Series, detector: str) -> float:
+    """Returns a free speed to tell queues by: the median of the intervals that have none.
 
-    Raises CorampError where the detector has no speeds.
+    That are those at least 75 % as fast as the fastest 5 min, however long queues stand in the
+    data; 5 min of few vehicles count only where there are no others. Raises CorampError where the
+    detector has no speeds.
     """
-    speeds = data.speed_mps[detector]
+    speeds, coarse = data.speed_mps[detector], data.coarse()
     if np.isnan(speeds).all():
         raise CorampError(f"detector {detector}: has no speeds; calibration needs them")
-    return float(np.nanquantile(speeds, quantile))
+    means = coarse.speed_mps[detector]
+    many = (coarse.vehicles[detector] >= FEW) & ~np.isnan(means)
+    known = means[many] if many.any() else speeds[~np.isnan(speeds)]
+    return float(np.median(speeds[speeds >= QUEUE_SPEED * known.max()]))
 
 
 def speed_loops(site: Site, start_m: float) -> list[Detector]:

@@ -22,11 +22,11 @@ class Counter:
 class Effort:
     """How much is simulated: ``runs`` of the search, through ``seeds`` by turns, ``jobs`` at once.
 
-    ``speed_runs`` look at desired speeds each of four times, ``fit_runs`` at the fit of what was
+    ``speed_runs`` look at desired speeds each of two times, ``fit_runs`` at the fit of what was
     found.
     """
 
-    runs: int = 96
+    runs: int = 120
     seeds: int = 16
     jobs: int = 2
     speed_runs: int = 12
@@ -36,7 +36,7 @@ class Effort:
     @property
     def total(self) -> int:
         """How many runs a calibration takes at most."""
-        return self.runs + 4 * self.speed_runs + self.fit_runs
+        return self.runs + 2 * self.speed_runs + self.fit_runs
 
     def told_to(self, report: Callable[[int, int], None]) -> "Effort":
         """Returns the same, that tells somebody how far it is."""

@@ -1,8 +1,11 @@
 """A stretch of detector data in a few numbers, in which a population of drivers shows."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray
+from coramp.calibration.free_speed import free_speed
 from coramp.calibration.series import Series, breakdown_of, queued
 from coramp.calibration.site import Site
 
@@ -11,9 +14,26 @@ LONGER_S = 600.0
 OBJECTIVE = (
     "sum of squares of measured minus simulated over the simulation's noise: breakdown time, "
     "highest 5-minute and 10-minute flow before, flow that comes in the 10 minutes before, "
-    "discharge and the ramp's share of it, mean speed before and "
-    "after at each detector but the first of each road"
+    "discharge and the ramp's share of it; at each detector but the first of each road mean speed "
+    "with little and with more free traffic, spread of free speeds, and mean speed in the queue"
 )
+
+
+class Free(NamedTuple):
+    """Intervals of free traffic before a breakdown: those of lower, and those of higher flows."""
+
+    little: BoolArray
+    more: BoolArray
+
+
+def free_halves(measured: Series, site: Site, free_mps: float) -> Free:
+    """Returns the measured intervals before a breakdown in which traffic was free, by flow."""
+    free = ~queued(measured, site.upstream.id, free_mps)
+    onset = onset_s(measured, site, free_mps)
+    free[round((onset - measured.begin_s) / measured.interval_s) :] = False
+    flows = measured.vehicles[site.mainline_entry.id]
+    little = free & (flows <= np.median(flows[free])) if free.any() else free
+    return Free(little, free & ~little)
 
 
 def names_of_moments(site: Site) -> list[str]:
@@ -25,19 +45,22 @@ def names_of_moments(site: Site) -> list[str]:
         "flow that comes in the 10 min before (veh/h)",
         "discharge (veh/h)",
         "ramp's share of the discharge",
-        *(f"speed at {loop.id} before (m/s)" for loop in site.settled),
+        *(f"speed at {loop.id} with little traffic (m/s)" for loop in site.settled),
+        *(f"speed at {loop.id} with more traffic (m/s)" for loop in site.settled),
+        *(f"at {loop.id}: logarithm of the spread" for loop in site.settled),
         *(f"speed at {loop.id} after (m/s)" for loop in site.settled),
     ]
 
 
-def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
+def moments_of(series: Series, site: Site, free_mps: float, free: Free) -> FloatArray:
     """Returns numbers of what detectors told, nan for each that it does not tell.
 
     When the merge broke down, the end where it did not; the highest flow of 5 min before, that of
     any 10 min before, and the flow that came to the merge in the last 10 min before; the mean flow
-    from the first full interval of the queue on, and the share of it that came by the ramp; then at
-    each detector but the first of each road the mean speed of vehicles before the breakdown, and
-    from it on.
+    from the first full interval of the queue on, and the share of it that came by the ramp. Then at
+    each detector but the first of each road: mean speeds in the intervals that are ``free`` and the
+    logarithm of their spread among drivers (m/s), without intervals in which the series has a
+    queue; and the mean speed from the breakdown on.
     """
     coarse = series.coarse()
     start = breakdown_of(coarse, site.upstream.id, free_mps)
@@ -58,10 +81,21 @@ def moments_of(series: Series, site: Site, free_mps: float) -> FloatArray:
             *_flows_before(series.between(series.begin_s, onset), site),
             flow_veh_h[after].mean() if after.any() else np.nan,
             ramp[after].sum() / both[after].sum() if after.any() and both[after].sum() else np.nan,
-            *(_speed_mps(coarse, loop.id, before) for loop in site.settled),
+            *_free_speeds(series, site, free_mps, free),
             *(_speed_mps(coarse, loop.id, after) for loop in site.settled),
         ]
     )
+
+
+def _free_speeds(series: Series, site: Site, free_mps: float, free: Free) -> list[float]:
+    """Mean speeds with little and with more traffic, and logarithms of the spread, by detector."""
+    flowing = ~queued(series, site.upstream.id, free_mps)
+    parts = free.little, free.more, free.little | free.more
+    low, high, both = (
+        [free_speed(series, (loop.id,), part & flowing) for loop in site.settled] for part in parts
+    )
+    spreads = [np.log(one.deviation_mps) if one.deviation_mps else np.nan for one in both]
+    return [*(one.mean_mps for one in (*low, *high)), *spreads]
 
 
 def _flows_before(series: Series, site: Site) -> tuple[float, float]:

@@ -27,7 +27,7 @@ def calibrate(
         Path | None,
         typer.Option(metavar="FILE", help="Write the drivers, for coramp run --drivers FILE."),
     ] = None,
-    runs: Annotated[int, typer.Option(min=12, help="Runs of the search.")] = 96,
+    runs: Annotated[int, typer.Option(min=12, help="Runs of the search.")] = 120,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds 1 to N, by turns.")] = 16,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Runs at a time (default: one a core).")
