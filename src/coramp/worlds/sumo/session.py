@@ -233,6 +233,10 @@ class Session:
             list(map(native.vehicle_getSpeed, names)),
         )
 
+    def lanes(self) -> set[str]:
+        """Returns the names of all lanes of the network."""
+        return set(libsumo.lane.getIDList())
+
     def on_lanes(
         self, lanes: Iterable[str]
     ) -> tuple[list[str], list[int], list[float], list[float]]:
