@@ -28,6 +28,9 @@ class Pushed:
     def take_over(self, name):
         pass
 
+    def act_now(self, name):
+        pass
+
     def drive_evenly(self, names, before_mps, after_mps, steps):
         pass
 

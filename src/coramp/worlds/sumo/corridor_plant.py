@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +75,11 @@ class CorridorPlant(LanedPlant):
         self._zone_lanes = zone_lanes_of(sites, self.corridor.lanes)
         self._zone_limits = zone_limits_of(sites)
         self._held_at, self._seen_at = np.full(count, NO_SITE), np.full(count, NEVER)
+
+    @cached_property
+    def _may_act_rarely(self) -> bool:
+        """Nobody: between zones SUMO drives by what it has seen of lanes while vehicles acted."""
+        return False
 
     def _step_on(self) -> None:
         self.session.step_on()

@@ -24,6 +24,8 @@ NO_SITE = -1
 """Of who has not come by a ramp; sites are counted from 0."""
 NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
+ACTS_RARELY_MPS = 5.0
+"""From this speed on SUMO sees at each action farther than a vehicle drives up to its next one."""
 SMOOTHED_OVER_S = 0.5
 """Drivers' accelerations are noisy, and measured through a filter of this time constant."""
 
@@ -61,6 +63,7 @@ class MixedPlant:
     _changing: BoolArray = field(init=False)
     _from_ramp: BoolArray = field(init=False)
     _came_by: IntArray = field(init=False)
+    _acts_rarely: BoolArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Nobody has been sent anywhere yet."""
@@ -73,7 +76,7 @@ class MixedPlant:
             largest_error_m=np.where(self.able.automated, 0.0, np.nan),
         )
         self._changing, self._from_ramp = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-        self._came_by = np.full(count, NO_SITE)
+        self._came_by, self._acts_rarely = np.full(count, NO_SITE), np.zeros(count, np.bool_)
 
     @cached_property
     def watch(self) -> Watch:
@@ -143,6 +146,8 @@ class MixedPlant:
         for i in own[np.isnan(self._motion.sent_mps[number])].tolist():
             self._take_over(names[i], int(users.number[i]), bool(users.on_mainline[i]))
         self._settle(names, users, own, changes)
+        if self._may_act_rarely:
+            self._act(names, users, changes)
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self._change_lane(names[i])
@@ -181,6 +186,29 @@ class MixedPlant:
         for i in own[changing & ~on_mainline & ~changes[own]].tolist():
             self._changing[users.number[i]] = False
             self._take_over(names[i], int(users.number[i]), on_mainline=False)
+
+    @cached_property
+    def _may_act_rarely(self) -> bool:
+        """Whether nobody drives by himself whose random numbers SUMO draws together with others'.
+
+        SUMO draws them for all that act on a lane.
+        """
+        return bool(self.able.automated.all())
+
+    def _act(self, names: Sequence[str], users: RoadUsers, changes: BoolArray) -> None:
+        """Has SUMO ask a vehicle that keeps its lane only rarely what it would do by itself.
+
+        It does as commanded all the same, at each step: it drives the same way bit for bit.
+        """
+        number = users.number
+        rarely = users.on_mainline & ~changes & (users.speed_mps >= ACTS_RARELY_MPS)
+        other = rarely != self._acts_rarely[number]
+        self._acts_rarely[number] = rarely
+        for i in np.flatnonzero(other).tolist():
+            if rarely[i]:
+                self.session.act_now(names[i])
+            else:
+                self.session.act_each_step(names[i])
 
     def _forget_change(self, number: int) -> None:
         """Is told that a vehicle neither merges nor changes lanes any more."""

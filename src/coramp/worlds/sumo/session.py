@@ -314,6 +314,10 @@ class Session:
         """Lets a vehicle act in the next step: it looks anew at the lanes before it."""
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
 
+    def act_each_step(self, vehicle_id: str) -> None:
+        """Lets a vehicle act in each step again."""
+        libsumo.vehicle.setActionStepLength(vehicle_id, self._step_s, True)
+
     def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
         """Returns the lane that the vehicle's front is on, and its position along it (m).
 
