@@ -18,7 +18,7 @@ from coramp.mixed.lanes import (
 )
 from coramp.mixed.on_board import driven_mps2, neighbours_of
 from coramp.networks.limits import Limits
-from coramp.worlds.sumo.mixed_lanes import allowed_mps
+from coramp.worlds.sumo.road_limits import NO_LIMITS, RAMP_WAY, allowed_mps, road_limits_of
 from tests.mixed.roads import ON_BOARD, SAFETY, at_once, users_of
 
 B_MPS2 = SAFETY.braking_mps2
@@ -211,9 +211,10 @@ def test_two_do_not_change_into_one_gap_at_once():
     assert chosen_among(apart) == [0, 1]
 
 
-def test_limits_of_many_stations_are_those_of_each():
+def test_limits_as_arrays_allow_what_they_allow():
     limits = Limits((-300.0, -50.0, 0.0, 50.0), (20.0, 10.0, 12.5, 8.33))
     stations_m = [-1e3, -300.0, -200.3, -60.0, -50.0, -1e-9, 0.0, 17.7, 49.9, 50.0, 1e6]
     expected = [limits.allowed_mps(at_m) for at_m in stations_m]
-    assert allowed_mps(limits, np.array(stations_m)).tolist() == expected
-    assert allowed_mps(limits, np.empty(0)).tolist() == []
+    arrays = road_limits_of([[Limits((-9.0,), (1.0,)), limits]])
+    assert [allowed_mps(arrays, 0, RAMP_WAY, at_m) for at_m in stations_m] == expected
+    assert allowed_mps(NO_LIMITS, 0, RAMP_WAY, 3.0) == np.inf

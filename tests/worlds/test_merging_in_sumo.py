@@ -73,8 +73,14 @@ class Told:
         self.speed_mps = speed_mps
         self.calls = []
 
-    def everyone(self):
-        return ["r1"], ["merge_0"], [190.0], [self.speed_mps]
+    def lanes(self):
+        return {"merge_0"}
+
+    def step_on(self):
+        pass
+
+    def on_lanes(self, lanes):
+        return ["r1"], [1], [190.0], [self.speed_mps]
 
     def __getattr__(self, name):
         return lambda *told: self.calls.append((name, *told))
@@ -87,15 +93,15 @@ def on_the_acceleration_lane(session):
     one = np.ones(1)
     able = Able({"r1": 0}, one > 0, 5.0 * one, 20.0 * one, 2.5 * one, np.inf * one, 6.0 * one)
     slow = SlowActuators(Actuators(), 1, 0.1, np.inf)
-    plant = LanedPlant(session, {}, able, 2, 0.1, 2.0, slow)
     way = Way(("merge",), 0, Limits((0.0,), (20.0,)))
-    plant.is_on(
-        LanedRoad(Path("none"), way, way, {"merge_0": LaneSpan(0.0, 200.0, 1.0, -1, True)}, ())
-    )
+    spans = {"merge_0": LaneSpan(0.0, 200.0, 1.0, -1, True)}
+    plant = LanedPlant(session, spans, able, 2, 0.1, 2.0, slow)
+    plant.is_on(LanedRoad(Path("none"), way, way, spans, ()))
     return plant
 
 
 def commanded(plant, changes, asks=True):
+    plant.watch.step_on()
     names, _, users = plant.users()
     plant.command(names, users, np.zeros(1), np.array([changes]), np.array([asks]))
 

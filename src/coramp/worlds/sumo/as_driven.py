@@ -1,10 +1,11 @@
 """The outcome of a run as SUMO's positions have it, for whom nothing was planned."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from coramp._kernel import FloatArray
+from coramp._kernel import BoolArray, FloatArray
 from coramp.coordination.plant import Arrival
 from coramp.metrics.motion import pieces_of_samples
 from coramp.records.lanes import first_on_mainline_s, seen_history
@@ -16,10 +17,17 @@ from coramp.worlds.outcomes import cap_step_of, passages_of
 from coramp.worlds.sumo.files import RunFiles, Samples
 
 
+class Driving(NamedTuple):
+    """Where SUMO's vehicles were, and which have left the road, one entry an arrival."""
+
+    samples: Samples
+    finished: BoolArray
+
+
 def outcome_as_driven(
     scenario: Scenario,
     arrivals: Sequence[Arrival],
-    samples: Samples,
+    driving: Driving,
     files: RunFiles,
     cut_off_s: float | None = None,
 ) -> Outcome:
@@ -27,10 +35,9 @@ def outcome_as_driven(
 
     ``cut_off_s`` is when SUMO was ended before everybody had left, if not at the scenario's end.
     """
-    finished = files.finished()
-    step_s = scenario.control.step_s
+    samples, step_s = driving.samples, scenario.control.step_s
     cap_s = cap_step_of(scenario) * step_s if cut_off_s is None else cut_off_s
-    entry_s, exit_s = _passing_times(samples, arrivals, finished, scenario.mainline.end_m, step_s)
+    entry_s, exit_s = _passing_times(driving, scenario.mainline.end_m, step_s)
     first, rows = pieces_of_samples(*samples.motion, len(arrivals))
     left = not np.isnan(exit_s).any()
     no_plan = np.full(len(arrivals), np.nan)
@@ -51,20 +58,14 @@ def outcome_as_driven(
     )
 
 
-def _passing_times(
-    samples: Samples,
-    arrivals: Sequence[Arrival],
-    finished: set[str],
-    end_m: float,
-    step_s: float,
-) -> tuple[FloatArray, FloatArray]:
+def _passing_times(driving: Driving, end_m: float, step_s: float) -> tuple[FloatArray, FloatArray]:
     """Entry and exit of each vehicle; its last sample is run on to the zone's end."""
-    entry_s, exit_s = (np.full(len(arrivals), np.nan) for _ in range(2))
+    samples, finished = driving
+    entry_s, exit_s = (np.full(len(finished), np.nan) for _ in range(2))
     seen, first = np.unique(samples.vehicle, return_index=True)
     last = np.append(first[1:], len(samples.vehicle))[: len(first)] - 1
     entry_s[seen] = samples.time_s[first]
     left_m = end_m - samples.station_m[last]
     run_on_s = np.minimum(left_m / np.maximum(samples.speed_mps[last], 1e-9), step_s)
     exit_s[seen] = samples.time_s[last] + run_on_s
-    done = np.array([arrival.vehicle_id in finished for arrival in arrivals], np.bool_)
-    return entry_s, np.where(done, exit_s, np.nan)
+    return entry_s, np.where(finished, exit_s, np.nan)

@@ -6,12 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
-from coramp.networks.limits import SLOWS_MPS2, Limits
 from coramp.worlds.sumo.corridor_road import SiteRoad
 from coramp.worlds.sumo.network import RAMP_LANE, LaneSpan
+from coramp.worlds.sumo.road_limits import (
+    MAINLINE_WAY,
+    RAMP_WAY,
+    RoadLimits,
+    allowed_mps,
+    road_limits_of,
+)
 
-MAINLINE_WAY, RAMP_WAY = 0, 1
-"""The ways of a site, of each of which limits are kept."""
 NO_SPAN = LaneSpan(0.0, 0.0, 0.0, RAMP_LANE, False)
 """Of a lane that is none of a site's."""
 
@@ -40,15 +44,6 @@ class ZoneLanes(NamedTuple):
     from_m: FloatArray
     to_m: FloatArray
     sees_m: FloatArray
-
-
-class ZoneLimits(NamedTuple):
-    """Speed limits as arrays [site, way, place along it]; ``known`` is how many each way has."""
-
-    known: IntArray
-    from_m: FloatArray
-    limit_mps: FloatArray
-    squared: FloatArray
 
 
 class Placed(NamedTuple):
@@ -96,33 +91,19 @@ def zone_lanes_of(sites: Sequence[SiteRoad], lanes: Sequence[str]) -> ZoneLanes:
     )
 
 
-def zone_limits_of(sites: Sequence[SiteRoad]) -> ZoneLimits:
+def zone_limits_of(sites: Sequence[SiteRoad]) -> RoadLimits:
     """Returns the limits along both ways of all sites."""
-    ways = [[own.limits(on_ramp) for on_ramp in (False, True)] for own in sites]
-    most = max(len(limits.from_m) for way in ways for limits in way)
-
-    def padded(values: Sequence[float]) -> list[float]:
-        return [*values, *[np.inf] * (most - len(values))]
-
-    def squares(limits: Limits) -> list[float]:
-        return [limit**2 for limit in limits.limit_mps]
-
-    return ZoneLimits(
-        np.array([[len(limits.from_m) for limits in way] for way in ways], np.int64),
-        np.array([[padded(limits.from_m) for limits in way] for way in ways], np.float64),
-        np.array([[padded(limits.limit_mps) for limits in way] for way in ways], np.float64),
-        np.array([[padded(squares(limits)) for limits in way] for way in ways], np.float64),
-    )
+    return road_limits_of([[own.limits(on_ramp) for on_ramp in (False, True)] for own in sites])
 
 
-def placed_of(lanes: ZoneLanes, limits: ZoneLimits, found: Found) -> Placed:
+def placed_of(lanes: ZoneLanes, limits: RoadLimits, found: Found) -> Placed:
     """Returns who is in a zone, or just ahead of it."""
     return Placed(*_placed(lanes, limits, found.place, found.position_m))
 
 
 @kernel
 def _placed(
-    lanes: ZoneLanes, limits: ZoneLimits, place: IntArray, position_m: FloatArray
+    lanes: ZoneLanes, limits: RoadLimits, place: IntArray, position_m: FloatArray
 ) -> tuple[
     IntArray,
     IntArray,
@@ -154,7 +135,7 @@ def _placed(
             own_lane[count], beside[count] = lanes.lane[site, own], lanes.changes[site, own]
             inside[count] = station_m < lanes.to_m[site]
             beyond_start[count] = station_m - from_m
-            allowed[count] = _allowed_mps(limits, site, way, station_m)
+            allowed[count] = allowed_mps(limits, site, way, station_m)
             count += 1
         first[site + 1] = count
     return (
@@ -168,18 +149,3 @@ def _placed(
         beyond_start[:count].copy(),
         allowed[:count].copy(),
     )
-
-
-@kernel
-def _allowed_mps(limits: ZoneLimits, site: int, way: int, station_m: float) -> float:
-    """``Limits.allowed_mps`` of a way, to the last bit."""
-    count = limits.known[site, way]
-    here = 0
-    while here + 1 < count and limits.from_m[site, way, here + 1] <= station_m:
-        here += 1
-    allowed_mps = limits.limit_mps[site, way, here]
-    for k in range(here + 1, count):
-        ahead_m = limits.from_m[site, way, k] - station_m
-        slows_mps = np.sqrt(limits.squared[site, way, k] + 2.0 * SLOWS_MPS2 * ahead_m)
-        allowed_mps = min(allowed_mps, slows_mps)
-    return float(allowed_mps)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ from coramp.worlds.sumo.corridor_look import (
     Found,
     Placed,
     ZoneLanes,
-    ZoneLimits,
     placed_of,
     zone_lanes_of,
     zone_limits_of,
@@ -21,7 +21,10 @@ from coramp.worlds.sumo.corridor_look import (
 from coramp.worlds.sumo.corridor_record import CorridorRecord
 from coramp.worlds.sumo.corridor_road import CorridorRoad
 from coramp.worlds.sumo.corridor_sites import SiteAnswer, SiteView
-from coramp.worlds.sumo.mixed_lanes import NO_SITE, LanedPlant
+from coramp.worlds.sumo.mixed_lanes import LanedPlant
+from coramp.worlds.sumo.mixed_plant import NO_SITE
+from coramp.worlds.sumo.road_limits import RoadLimits
+from coramp.worlds.sumo.road_users import tails
 
 NEVER = -1
 
@@ -57,7 +60,7 @@ class CorridorPlant(LanedPlant):
     record: CorridorRecord = field(default_factory=lambda: CorridorRecord(0, 1.0))
     commands: bool = True
     _zone_lanes: ZoneLanes = field(init=False)
-    _zone_limits: ZoneLimits = field(init=False)
+    _zone_limits: RoadLimits = field(init=False)
     _whole: Whole = field(init=False)
     _held: dict[int, str] = field(default_factory=dict)
     _held_at: IntArray = field(init=False)
@@ -72,6 +75,14 @@ class CorridorPlant(LanedPlant):
         self._zone_lanes = zone_lanes_of(sites, self.corridor.lanes)
         self._zone_limits = zone_limits_of(sites)
         self._held_at, self._seen_at = np.full(count, NO_SITE), np.full(count, NEVER)
+
+    @cached_property
+    def _may_act_rarely(self) -> bool:
+        """Nobody: between zones SUMO drives by what it has seen of lanes while vehicles acted."""
+        return False
+
+    def _step_on(self) -> None:
+        self.session.step_on()
 
     def look(self, now_s: float) -> list[ZoneUsers]:
         """Returns who is in or just ahead of each zone, and takes back who has left one."""
@@ -193,7 +204,7 @@ class CorridorPlant(LanedPlant):
         names = [found.names[i] for i in place.tolist()]
         self._whole = Whole(names, users, placed.lane, placed.inside)
         may_leave = placed.beside & (placed.lane == RAMP_LANE) & placed.inside
-        ahead, tail = self.ahead(users), self._tails(users, placed.lane, placed.site)
+        ahead, tail = self.ahead(users), tails(users, placed.lane, placed.site, self._came_by)
         zones = []
         for k in range(len(placed.first) - 1):
             own = placed.of_site(k)

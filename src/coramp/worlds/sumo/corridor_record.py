@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coramp._kernel import BoolArray, FloatArray, IntArray
-from coramp.worlds.sumo.mixed_lanes import NO_SITE
+from coramp.worlds.sumo.mixed_plant import NO_SITE
 from coramp.worlds.sumo.network import RAMP_LANE
 
 HARD_MPS2 = 3.0

@@ -221,14 +221,15 @@ class RunFiles:
             for c in root.iter("collision")
         )
 
-    def finished(self) -> set[str]:
-        """Returns the vehicles that left the network."""
+    def finished(self, arrivals: Sequence[Arrival]) -> BoolArray:
+        """Returns which vehicles left the network, one entry an arrival."""
         root = ET.parse(self._folder / "tripinfo.xml").getroot()
-        return {
+        left = {
             trip.get("id", "")
             for trip in root.iter("tripinfo")
             if float(trip.get("arrival", "-1")) >= 0.0
         }
+        return np.array([arrival.vehicle_id in left for arrival in arrivals], np.bool_)
 
     def samples(self, arrivals: Sequence[Arrival]) -> Samples:
         """Returns all positions, by vehicle and time."""

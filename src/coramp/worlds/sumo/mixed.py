@@ -26,7 +26,7 @@ from coramp.scenarios.model import Scenario
 from coramp.strategies.base import steps_of_period
 from coramp.worlds.faults.air import Air
 from coramp.worlds.outcomes import cap_step_of
-from coramp.worlds.sumo.as_driven import outcome_as_driven
+from coramp.worlds.sumo.as_driven import Driving, outcome_as_driven
 from coramp.worlds.sumo.careless import Careless
 from coramp.worlds.sumo.demand import driver_routes
 from coramp.worlds.sumo.files import RunFiles, SumoOptions
@@ -39,7 +39,6 @@ from coramp.worlds.sumo.mixed_setup import (
     automated_types,
     laws_of,
 )
-from coramp.worlds.sumo.network import RoadPlan
 from coramp.worlds.sumo.session import Session
 from coramp.worlds.sumo.traits import traits_of, with_careless
 
@@ -77,7 +76,7 @@ def begun(
     step_s = scenario.control.step_s
     period_steps = steps_of_period(strategy.decision_s, step_s)
     automated = automated_of(scenario, arrivals, seed)
-    files = RunFiles(folder, scenario, plan, seed, options, ballistic=False, sampled=True)
+    files = RunFiles(folder, scenario, plan, seed, options, ballistic=False)
     traits = with_careless(traits_of(drivers, arrivals, seed), scenario.behaviour, seed)
     actuators = actuators_of(scenario, len(arrivals))
     types = automated_types(scenario, automated, period_steps * step_s, actuators.delay_s)
@@ -90,7 +89,7 @@ def begun(
         plant_kind, control_kind = _kinds_on(laned)
         plant = plant_kind(
             session,
-            plan.lane_starts_m() if isinstance(plan, RoadPlan) else {},
+            plan.spans(),
             Able.of(scenario, arrivals, automated),
             period_steps,
             step_s,
@@ -168,7 +167,7 @@ class MixedRun:
         step, cap_step = 0, cap_step_of(self.scenario)
         while step < cap_step and (step == 0 or plant.session.vehicles_left()):
             step = min(cap_step, step + plant.period_steps)
-            plant.session.step_to(step)
+            plant.watch.step_to(step)
             names, on_lane, users = plant.users()
             now_s = step * plant.step_s
             careless.act_among(now_s, names, users)
@@ -189,8 +188,9 @@ class MixedRun:
 
     def outcome(self, end_s: float | None = None) -> Outcome:
         """Returns what happened once SUMO has ended, at ``end_s`` where it was cut off early."""
-        samples, passed = self.files.samples(self.arrivals), self.plant
-        outcome = outcome_as_driven(self.scenario, self.arrivals, samples, self.files, end_s)
+        passed, seen = self.plant, self.plant.watch
+        driven = Driving(seen.samples(), seen.finished())
+        outcome = outcome_as_driven(self.scenario, self.arrivals, driven, self.files, end_s)
         passages = replace(
             outcome.passages,
             plan_error_m=passed.largest_error_m,

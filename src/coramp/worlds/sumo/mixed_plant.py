@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -13,12 +14,18 @@ from coramp.worlds.faults.actuators import SlowActuators
 from coramp.worlds.sumo.lanes import LanedRoad
 from coramp.worlds.sumo.mixed_motion import Motion, measured, sent_evenly
 from coramp.worlds.sumo.mixed_setup import Able
-from coramp.worlds.sumo.network import RAMP_LANES
+from coramp.worlds.sumo.network import LaneSpan
+from coramp.worlds.sumo.road_limits import NO_LIMITS, RoadLimits
+from coramp.worlds.sumo.road_users import LaneTable, OnRoad, lane_table_of, on_road
 from coramp.worlds.sumo.session import Session
+from coramp.worlds.sumo.watch import Watch
 
-MERGE_LANE = "merge_0"
+NO_SITE = -1
+"""Of who has not come by a ramp; sites are counted from 0."""
 NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
+ACTS_RARELY_MPS = 5.0
+"""From this speed on SUMO sees at each action farther than a vehicle drives up to its next one."""
 SMOOTHED_OVER_S = 0.5
 """Drivers' accelerations are noisy, and measured through a filter of this time constant."""
 
@@ -41,12 +48,12 @@ class MixedPlant:
     """The vehicles in a SUMO session: where they are, and what automated ones do.
 
     An automated vehicle's speed is that of its commands: under Euler steps SUMO's own is off by
-    half a step's acceleration. ``min_gap_m`` is what SUMO has it keep once it is on the
-    mainline.
+    half a step's acceleration. ``spans`` are the lanes that are watched. ``min_gap_m`` is what SUMO
+    has it keep once it is on the mainline.
     """
 
     session: Session
-    lane_starts_m: Mapping[str, float]
+    spans: Mapping[str, LaneSpan]
     able: Able
     period_steps: int
     step_s: float
@@ -56,10 +63,8 @@ class MixedPlant:
     _changing: BoolArray = field(init=False)
     _asking: BoolArray = field(init=False)
     _from_ramp: BoolArray = field(init=False)
-    _lane_numbers: dict[str, int] = field(init=False)
-    _starts_m: FloatArray = field(init=False)
-    _on_mainline: BoolArray = field(init=False)
-    _may_merge: BoolArray = field(init=False)
+    _came_by: IntArray = field(init=False)
+    _acts_rarely: BoolArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Nobody has been sent anywhere yet."""
@@ -73,11 +78,12 @@ class MixedPlant:
         )
         self._changing, self._from_ramp = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         self._asking = np.zeros(count, np.bool_)
-        lanes = list(self.lane_starts_m)
-        self._lane_numbers = {lane: k for k, lane in enumerate(lanes)}
-        self._starts_m = np.array([self.lane_starts_m[lane] for lane in lanes])
-        self._on_mainline = np.array([lane not in RAMP_LANES for lane in lanes], np.bool_)
-        self._may_merge = np.array([lane == MERGE_LANE for lane in lanes], np.bool_)
+        self._came_by, self._acts_rarely = np.full(count, NO_SITE), np.zeros(count, np.bool_)
+
+    @cached_property
+    def watch(self) -> Watch:
+        """Lets the session go on, and notes who is on its lanes."""
+        return Watch(self.session, self.spans, self.able.number, self.step_s)
 
     @property
     def largest_error_m(self) -> FloatArray:
@@ -89,38 +95,42 @@ class MixedPlant:
         """The time (s) between two commands."""
         return self.period_steps * self.step_s
 
+    @cached_property
+    def _lanes(self) -> LaneTable:
+        return lane_table_of(self.watch.spans.values())
+
     def is_on(self, road: LanedRoad) -> None:
         """Is told its road where that has several lanes."""
 
     def users(self) -> tuple[list[str], BoolArray, RoadUsers]:
         """Returns names, who is on the acceleration lane, and all that is on the road."""
-        names, lanes, position_m, sumo_mps = self.session.everyone()
-        able, number_of, lane_of = self.able, self.able.number, self._lane_numbers
-        number = np.array([number_of[name] for name in names], np.int64)
-        lane = np.array([lane_of[name] for name in lanes], np.int64)
-        station_m = self._starts_m[lane] + np.array(position_m)
-        speed_mps, accel_mps2 = self._measured(number, station_m, sumo_mps)
-        users = RoadUsers(
-            number,
-            station_m,
-            speed_mps,
-            accel_mps2,
-            able.length_m[number],
-            self._on_mainline[lane],
-            able.automated[number],
-            able.cruise_mps[number],
-            able.acceleration_mps2[number],
-            able.power_wpkg[number],
-            able.braking_mps2[number],
+        names, seen = self._on_road(NO_LIMITS)
+        return names, seen.may_leave, seen.users
+
+    def _on_road(self, limits: RoadLimits) -> tuple[list[str], OnRoad]:
+        """Names, and all that is on the road, each at most as fast as limits let it."""
+        look, period_s = self.watch.look(), self.period_s
+        seen = on_road(
+            look.number,
+            look.place,
+            look.position_m,
+            look.speed_mps,
+            self._lanes,
+            limits,
+            self.able.columns,
+            self._motion,
+            self._came_by,
+            period_s,
+            min(1.0, period_s / SMOOTHED_OVER_S),
         )
-        return names, self._may_merge[lane], users
+        return look.names, seen
 
     def _measured(
-        self, number: IntArray, station_m: FloatArray, sumo_mps: Sequence[float] | FloatArray
+        self, number: IntArray, station_m: FloatArray, sumo_mps: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Speeds (m/s) and accelerations (m/s2) of who is on the road now."""
         share = min(1.0, self.period_s / SMOOTHED_OVER_S)
-        return measured(number, station_m, np.array(sumo_mps), self._motion, self.period_s, share)
+        return measured(number, station_m, sumo_mps, self._motion, self.period_s, share)
 
     def ahead(self, users: RoadUsers) -> Ahead:
         """Returns where vehicles will be when a new command begins to act."""
@@ -147,6 +157,8 @@ class MixedPlant:
             self._take_over(names[i], int(users.number[i]), bool(users.on_mainline[i]))
         self._settle(names, users, own, changes)
         self._ask(names, users, own, asks)
+        if self._may_act_rarely:
+            self._act(names, users, changes)
         for i in np.flatnonzero(changes).tolist():
             self.session.judge_gaps_by(names[i], self.min_gap_m, 1.0)
             self._change_lane(names[i])
@@ -194,6 +206,29 @@ class MixedPlant:
             self.session.ask_drivers(names[i], bool(asks[i]))
             self._asking[users.number[i]] = asks[i]
 
+    @cached_property
+    def _may_act_rarely(self) -> bool:
+        """Whether nobody drives by himself whose random numbers SUMO draws together with others'.
+
+        SUMO draws them for all that act on a lane.
+        """
+        return bool(self.able.automated.all())
+
+    def _act(self, names: Sequence[str], users: RoadUsers, changes: BoolArray) -> None:
+        """Has SUMO ask a vehicle that keeps its lane only rarely what it would do by itself.
+
+        It does as commanded all the same, at each step: it drives the same way bit for bit.
+        """
+        number = users.number
+        rarely = users.on_mainline & ~changes & (users.speed_mps >= ACTS_RARELY_MPS)
+        other = rarely != self._acts_rarely[number]
+        self._acts_rarely[number] = rarely
+        for i in np.flatnonzero(other).tolist():
+            if rarely[i]:
+                self.session.act_now(names[i])
+            else:
+                self.session.act_each_step(names[i])
+
     def _forget_change(self, number: int) -> None:
         """Is told that a vehicle neither merges nor changes lanes any more."""
         self._changing[number] = self._from_ramp[number] = False
@@ -210,11 +245,15 @@ class MixedPlant:
             return
         for step in range(self.period_steps):
             if step > 0:
-                self.session.step_on()
+                self._step_on()
                 here = self.session.still_here(names)
                 names = [name for name, there in zip(names, here, strict=True) if there]
                 number, accel_mps2 = number[here], accel_mps2[here]
             self._drive_evenly(names, number, self.actuators.driven(number, accel_mps2), 1)
+
+    def _step_on(self) -> None:
+        """Executes a step within a period."""
+        self.watch.step_on()
 
     def _drive_evenly(
         self, names: Sequence[str], number: IntArray, accel_mps2: FloatArray, steps: int

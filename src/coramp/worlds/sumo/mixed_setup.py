@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from coramp.scenarios.sections import DriverPopulation
 from coramp.vehicles.traits import Traits
 from coramp.worlds.faults.actuators import SlowActuators
 from coramp.worlds.sumo.demand import Automated, automated_cruise_mps
+from coramp.worlds.sumo.road_users import Abilities
 
 MORE_BEHIND_DRIVER_M, MORE_BEHIND_DRIVER_S = 0.5, 0.15
 """How much more than behind an automated vehicle one keeps behind a driver."""
@@ -110,7 +112,7 @@ def automated_types(
 
 @dataclass(frozen=True)
 class Able:
-    """What vehicles are and can do, one entry an arrival."""
+    """What vehicles are and can do, one entry an arrival; ``number`` tells them by their names."""
 
     number: Mapping[str, int]
     automated: BoolArray
@@ -119,6 +121,18 @@ class Able:
     acceleration_mps2: FloatArray
     power_wpkg: FloatArray
     braking_mps2: FloatArray
+
+    @cached_property
+    def columns(self) -> Abilities:
+        """All of it but names, for kernels."""
+        return Abilities(
+            self.automated,
+            self.length_m,
+            self.cruise_mps,
+            self.acceleration_mps2,
+            self.power_wpkg,
+            self.braking_mps2,
+        )
 
     @classmethod
     def of(cls, scenario: Scenario, arrivals: Sequence[Arrival], automated: BoolArray) -> "Able":

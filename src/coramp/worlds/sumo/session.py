@@ -238,6 +238,10 @@ class Session:
             list(map(native.vehicle_getSpeed, names)),
         )
 
+    def lanes(self) -> set[str]:
+        """Returns the names of all lanes of the network."""
+        return set(libsumo.lane.getIDList())
+
     def on_lanes(
         self, lanes: Iterable[str]
     ) -> tuple[list[str], list[int], list[float], list[float]]:
@@ -314,6 +318,10 @@ class Session:
     def act_now(self, vehicle_id: str) -> None:
         """Lets a vehicle act in the next step: it looks anew at the lanes before it."""
         libsumo.vehicle.setActionStepLength(vehicle_id, ACTION_S, True)
+
+    def act_each_step(self, vehicle_id: str) -> None:
+        """Lets a vehicle act in each step again."""
+        libsumo.vehicle.setActionStepLength(vehicle_id, self._step_s, True)
 
     def lane_and_position_m(self, vehicle_id: str) -> tuple[str, float]:
         """Returns the lane that the vehicle's front is on, and its position along it (m).

@@ -18,7 +18,7 @@ from coramp.records.outcome import Outcome
 from coramp.scenarios.model import Scenario
 from coramp.strategies.base import Decider, is_metered, period_of, steps_of_period
 from coramp.worlds.outcomes import cap_step_of, step_after
-from coramp.worlds.sumo.as_driven import outcome_as_driven
+from coramp.worlds.sumo.as_driven import Driving, outcome_as_driven
 from coramp.worlds.sumo.careless import Careless, CarelessDrivers
 from coramp.worlds.sumo.demand import KRAUSS, Automated, driver_routes
 from coramp.worlds.sumo.files import RunFiles, Samples, SumoOptions
@@ -80,7 +80,8 @@ def run_uncontrolled(
             _let_drive(session, service, road, meter, careless, Looks(look_steps, cap_step))
         files.keep()
         samples = files.samples(arrivals)
-        outcome = outcome_as_driven(scenario, arrivals, samples, files)
+        driving = Driving(samples, files.finished(arrivals))
+        outcome = outcome_as_driven(scenario, arrivals, driving, files)
     told = None
     if options.keep_messages:
         end_step = _end_step(outcome, cap_step, step_s)
