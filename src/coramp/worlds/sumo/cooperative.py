@@ -241,7 +241,7 @@ class CooperativePlant:
     def _change_further_in(self, step: int, vehicle: Driven, following: Following) -> None:
         """Has a vehicle change to the next lane further in, once more where it still has not.
 
-        Inside a node nobody changes lanes.
+        Inside a node SUMO may not carry it out.
         """
         lane, _ = self._session.lane_and_position_m(vehicle.vehicle_id)
         if self._spans[lane].lane > vehicle.lane:
