@@ -32,12 +32,12 @@ def examine(folder: Path) -> Outside:
     fronts = fcd.with_columns(
         pl.col("station_m", "speed_mps", "length_m", "vehicle_id")
         .shift(-1)
-        .over("time_s", "on_mainline", order_by="station_m")
+        .over("time_s", "lane", order_by="station_m")
         .name.prefix("front_")
     ).drop_nulls("front_station_m")
     gap_m = (fronts["front_station_m"] - fronts["front_length_m"] - fronts["station_m"]).to_numpy()
     needed_m = _eq_1(fronts["front_speed_mps"].to_numpy(), fronts["speed_mps"].to_numpy(), spec)
-    merges = _merges(fcd, spec)
+    merges = _merges(fcd.filter(pl.col("lane") < 1), spec)
     return Outside(
         fcd["vehicle_id"].n_unique(),
         float(gap_m.min(initial=math.inf)),
@@ -63,7 +63,7 @@ def _positions(folder: Path, spec: dict) -> pl.DataFrame:
         .select(
             "vehicle_id",
             time_s="timestep_time",
-            on_mainline=~pl.col("vehicle_lane").is_in(["ramp_0", "merge_0"]),
+            lane=_lane(),
             station_m=pl.col("vehicle_lane")
             .str.replace(r"_\d+$", "")
             .replace_strict(starts_m, return_dtype=pl.Float64)
@@ -72,6 +72,24 @@ def _positions(folder: Path, spec: dict) -> pl.DataFrame:
             length_m=pl.col("vehicle_id").replace_strict(lengths_m, return_dtype=pl.Float64),
         )
     )
+
+
+def _lane() -> pl.Expr:
+    """The mainline's lane, 0 next to the ramp; -1 on the ramp and the acceleration lane."""
+    edge = pl.col("vehicle_lane").str.replace(r"_\d+$", "")
+    index = pl.col("vehicle_lane").str.extract(r"_(\d+)$").cast(pl.Int64)
+    return index - edge.is_in(["ramp", "merge"]).cast(pl.Int64)
+
+
+def changes(folder: Path) -> list[tuple[str, int, int, float]]:
+    """Returns who changed lanes, from which to which, and when it was first seen there (s)."""
+    spec = json.loads((folder / "run.json").read_text())["specification"]
+    fcd = _positions(folder, spec).sort("vehicle_id", "time_s")
+    before = fcd.select(pl.col("vehicle_id", "lane").shift(1).name.prefix("from_"))
+    rows = fcd.hstack(before).filter(
+        pl.col("vehicle_id") == pl.col("from_vehicle_id"), pl.col("lane") != pl.col("from_lane")
+    )
+    return list(rows.select("vehicle_id", "from_lane", "lane", "time_s").iter_rows())
 
 
 def _lengths(folder: Path) -> list[dict]:
@@ -96,11 +114,11 @@ def _eq_1(front_mps: np.ndarray, rear_mps: np.ndarray, spec: dict) -> np.ndarray
 
 
 def _merges(fcd: pl.DataFrame, spec: dict) -> list[tuple[float, float]]:
-    """Margin and station of each ramp vehicle at its first step on the mainline."""
+    """Margin and station of each ramp vehicle at its first step on the outermost lane."""
     safety = spec["safety"]
     friction = safety["adhesion"] + safety["resistance"]
     along = math.cos(math.radians(spec["ramp"]["merge_angle_deg"]))
-    on_mainline = fcd.filter("on_mainline")
+    on_mainline = fcd.filter(pl.col("lane") == 0)
     at = {time: group for (time,), group in on_mainline.group_by("time_s")}
     found = []
     merged = on_mainline.filter(pl.col("vehicle_id").str.starts_with("r"))

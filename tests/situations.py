@@ -70,6 +70,24 @@ def named(arrivals):
 
 
 @st.composite
+def lane_traffic(draw):
+    """A valid road of several lanes, with vehicles on each of them and on the ramp."""
+    names = ("safety.time_gap_s", "control.actuation_delay_s", "control.gap_position")
+    chosen = {key: draw(st.sampled_from(OVERRIDES[key])) for key in names}
+    lanes = draw(st.integers(2, 4))
+    scenario = load_scenario("paper", {**chosen, "mainline.lanes": lanes})
+    arrivals = []
+    for lane in (*range(lanes), None):
+        low, high = (scenario.ramp if lane is None else scenario.mainline).entry_speed_mps
+        gaps = draw(st.lists(st.integers(8, 60), min_size=1, max_size=12))
+        arrivals += [
+            Arrival("", lane is None, step, draw(st.floats(low, high)), 5.0, lane=lane or 0)
+            for step in np.cumsum(gaps).tolist()
+        ]
+    return scenario, named(arrivals)
+
+
+@st.composite
 def situations(draw, names=tuple(COOPERATIVE)):
     """A scenario with traffic, and a cooperative strategy, of those named."""
     scenario = draw(scenarios())

@@ -5,33 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coramp.coordination.plant import Arrival
 from coramp.scenarios.loading import load_scenario
 from coramp.strategies.registry import strategies
 from tests.coordination.test_properties import before
-from tests.situations import OVERRIDES, SAMPLE_S, driven, eq_1, loop, named, states
+from tests.situations import SAMPLE_S, driven, eq_1, lane_traffic, loop, named, states
 
 STRATEGIES = [name for name, kind in strategies().items() if getattr(kind, "makes_way", False)]
 CHANGE_S = 4.5
 TYPES = [{"name": "car", "share": 0.7}, {"name": "truck", "share": 0.3}]
-
-
-@st.composite
-def lane_traffic(draw):
-    """A valid road of several lanes, with vehicles on each of them and on the ramp."""
-    names = ("safety.time_gap_s", "control.actuation_delay_s", "control.gap_position")
-    chosen = {key: draw(st.sampled_from(OVERRIDES[key])) for key in names}
-    lanes = draw(st.integers(2, 4))
-    scenario = load_scenario("paper", {**chosen, "mainline.lanes": lanes})
-    arrivals = []
-    for lane in (*range(lanes), None):
-        low, high = (scenario.ramp if lane is None else scenario.mainline).entry_speed_mps
-        gaps = draw(st.lists(st.integers(8, 60), min_size=1, max_size=12))
-        arrivals += [
-            Arrival("", lane is None, step, draw(st.floats(low, high)), 5.0, lane=lane or 0)
-            for step in np.cumsum(gaps).tolist()
-        ]
-    return scenario, named(arrivals)
 
 
 def least_margin_in_lanes_m(coordinator, arrivals, safety):

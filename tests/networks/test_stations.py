@@ -16,6 +16,7 @@ from coramp.networks.ramps import on_ramps
 from coramp.networks.stations import Place, stations_of
 from coramp.road.lanes import ACCELERATION_LANE, MAINLINE, RAMP
 from coramp.scenarios.loading import load_scenario
+from coramp.worlds.sumo.lanes import laned_spans
 from coramp.worlds.sumo.network import network_file, road_plan, sumo_binary
 from tests.networks import A10KW, HIGHWAY, MERGE, ROAD, SHIPPED, made, only_ramp
 from tests.networks import RAMP as RAMP_NETWORK
@@ -61,12 +62,22 @@ def test_a_station_comes_back_from_its_position_within_a_centimetre(drawn, share
     assert abs(stations.place(lane_id, position_m).station_m - station_m) < NEAR_M
 
 
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_lanes_lie_where_the_plan_of_the_made_road_has_them(lanes):
+    plan = road_plan(load_scenario("paper", {"mainline.lanes": lanes}))
+    spans = laned_spans(only_ramp(network_file(plan)))
+    planned = plan.spans()
+    assert set(planned) - set(spans) == {":stopline_0_0", "gore_0"}
+    for lane_id, span in spans.items():
+        own = planned[lane_id]
+        assert (own.lane, own.changes) == (span.lane, span.changes)
+        assert own.start_m == pytest.approx(span.start_m, abs=0.002)
+        assert own.end_m == pytest.approx(span.end_m, abs=0.002)
+
+
 def test_stations_are_those_of_the_made_road():
     plan = road_plan(load_scenario("paper"))
     stations = stations_of(only_ramp(network_file(plan)))
-    for lane_id, start_m in plan.lane_starts_m().items():
-        if not lane_id.startswith((":", "gore")):
-            assert stations.place(lane_id, 0.0).station_m == pytest.approx(start_m, abs=0.002)
     codes = {stretch.lane_id: stretch.code for stretch in stations.stretches}
     assert codes == {
         "ramp_0": RAMP,

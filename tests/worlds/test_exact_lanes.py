@@ -96,7 +96,7 @@ def test_the_picture_of_a_decision_leaves_out_who_is_further_in(made):
     [
         ("slots", "exact", "strategy: slots plans for one lane, and mainline.lanes is above 1; "),
         ("mixed-slots", "exact", "engine: exact cannot run where mainline.lanes is above 1; "),
-        ("ramp-priority", "sumo", "allowed are .*, engine exact, or mainline.lanes 1"),
+        ("slots", "sumo", "allowed are mainline-priority, .*uncontrolled, or mainline.lanes 1"),
     ],
 )
 def test_what_cannot_be_planned_on_several_lanes_is_refused_in_one_line(strategy, engine, line):

@@ -20,13 +20,15 @@ def coordinates_drivers(strategy: type[Strategy]) -> bool:
 
 
 def plans_in_lanes(scenario: Scenario, strategy: type[Strategy], engine: str) -> bool:
-    """Returns whether a run on several lanes is planned: all vehicles automated, engine exact.
+    """Returns whether a run on several lanes is planned: all vehicles automated, none coordinated.
 
     Raises CorampError where it would be, and the strategy or the road does not allow that.
     """
-    if engine != "exact" or not _is_plannable(scenario) or coordinates_drivers(strategy):
+    if not strategy.cooperative or not is_plannable(scenario) or coordinates_drivers(strategy):
         return False
     if not makes_way(strategy):
+        if engine != "exact":
+            return False  # what drives there in SUMO is told with those that need no plans
         able = ", ".join(name for name, kind in strategies().items() if makes_way(kind))
         raise CorampError(
             f"strategy: {strategy.name} plans for one lane, and mainline.lanes is above 1; "
@@ -37,23 +39,25 @@ def plans_in_lanes(scenario: Scenario, strategy: type[Strategy], engine: str) ->
     return True
 
 
-def _is_plannable(scenario: Scenario) -> bool:
-    """Whether all could be planned ahead on its road: nobody drives, nothing fails, no network."""
+def is_plannable(scenario: Scenario) -> bool:
+    """Returns whether all could be planned ahead: nobody drives, nothing fails, no network."""
     return scenario.network is None and not (scenario.is_mixed or scenario.has_faults)
 
 
 def check_mixed(scenario: Scenario, strategy: type[Strategy], engine: str, population: str) -> None:
     """Raises CorampError if a strategy, an engine or drivers cannot be those of mixed traffic."""
-    why, instead = _asked_for(scenario)
+    why, instead = _asked_for(scenario, strategy)
     if engine != "sumo":
         raise CorampError(f"engine: {engine} cannot run where {why}; choose sumo, or {instead}")
     if strategy.cooperative and not coordinates_drivers(strategy):
-        able = ", ".join(name for name, kind in strategies().items() if _among_drivers(kind))
-        instead = f"or {instead}"
-        if makes_way(strategy) and _is_plannable(scenario):
-            instead = f"engine exact, {instead}"
+        planned = is_plannable(scenario)
+        able = ", ".join(
+            name
+            for name, kind in strategies().items()
+            if _among_drivers(kind) or (planned and makes_way(kind))
+        )
         raise CorampError(
-            f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, {instead}"
+            f"strategy: {strategy.name} cannot run where {why}; allowed are {able}, or {instead}"
         )
     if coordinates_drivers(strategy) and (line := _lag_problem(scenario, strategy)):
         raise CorampError(line)
@@ -95,11 +99,12 @@ def _period_s(scenario: Scenario, strategy: type[Strategy]) -> float:
     return steps_of_period(asked_s, scenario.control.step_s) * scenario.control.step_s
 
 
-def _asked_for(scenario: Scenario) -> tuple[str, str]:
-    """What is asked of a run that not all can do, and what to ask for instead."""
+def _asked_for(scenario: Scenario, strategy: type[Strategy]) -> tuple[str, str]:
+    """What is asked of a run that a strategy cannot do, and what to ask for instead."""
     if scenario.network is not None:
         return "the road lies in a network", "coramp's own road"
-    if not scenario.has_one_lane:
+    imperfect = scenario.is_mixed or scenario.has_faults
+    if not scenario.has_one_lane and not (makes_way(strategy) and imperfect):
         return "mainline.lanes is above 1", "mainline.lanes 1"
     if scenario.is_mixed:
         return "[traffic] leaves some vehicles to drivers", "automated shares of 1"

@@ -22,6 +22,7 @@ from coramp.runs.mixed import (
     broken_among_drivers,
     check_mixed,
     coordinates_drivers,
+    is_plannable,
     plans_in_lanes,
 )
 from coramp.runs.unserved import unheeded_line, unserved_line
@@ -31,6 +32,7 @@ from coramp.scenarios.population_files import is_population_file, read_populatio
 from coramp.scenarios.speeds_kmh import overrides_in_mps
 from coramp.scenarios.toml_files import key_parts
 from coramp.scenarios.vehicle_checks import check_vehicles_may_differ, slow_merge_warning
+from coramp.strategies.base import makes_way
 from coramp.strategies.registry import strategy_named
 from coramp.worlds.exact.engine import run_exact
 from coramp.worlds.sumo.engine import LARGEST_PLAN_ERROR_M, run_cooperative
@@ -99,12 +101,11 @@ class RunSpec:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether a strategy coordinates automated vehicles among drivers."""
-        coordinates = strategy_named(self.strategy).cooperative
-        scenario = self.scenario
+        """Whether a strategy coordinates automated vehicles among drivers, or as among drivers."""
+        scenario, strategy = self.scenario, strategy_named(self.strategy)
         other = scenario.is_mixed or scenario.has_faults or not scenario.has_one_lane
-        planned = self.engine == "exact"
-        return coordinates and other and scenario.has_automated and not planned
+        planned = self.engine == "exact" or (is_plannable(scenario) and makes_way(strategy))
+        return strategy.cooperative and other and scenario.has_automated and not planned
 
     @property
     def settings(self) -> str | None:

@@ -17,9 +17,10 @@ from coramp.road.rules import Rules
 from coramp.vehicles.merge_state import is_planned
 from coramp.worlds.sumo.commands import command_table, correction
 from coramp.worlds.sumo.demand import cooperative_type
+from coramp.worlds.sumo.network import RoadPlan
 from coramp.worlds.sumo.session import Session
 
-SPEED, MERGE, MEASURE, LOOK = range(4)
+SPEED, MERGE, MEASURE, LOOK, FURTHER_IN = range(5)
 CORRECT_FROM_M = 0.015
 """A vehicle this far off its plan is brought back."""
 SAME_SPEED_MPS = 1e-6
@@ -47,9 +48,15 @@ class Following:
 
 @dataclass(slots=True)
 class Driven:
-    """A vehicle in SUMO, and how its speed has changed since its last command."""
+    """A vehicle in SUMO, and how its speed has changed since its last command.
+
+    ``lane`` is the number of the lane by which it came, ``lane_change_s`` when it begins to change
+    to the next one.
+    """
 
     vehicle_id: str
+    lane: int = 0
+    lane_change_s: float = math.inf
     taken_over: bool = False
     largest_error_m: float = 0.0
     speed_mps: float = 0.0
@@ -71,13 +78,14 @@ class CooperativePlant:
     vehicle was compared with its plan besides.
     """
 
-    def __init__(self, session: Session, lane_starts_m: dict[str, float], rules: Rules) -> None:
+    def __init__(self, session: Session, road: RoadPlan, rules: Rules) -> None:
         self.vehicles: list[Driven] = []
         self.driven: list[tuple[int, float, float, float, float]] = []
         self.carried_on: list[int] = []
         self.compared: list[tuple[int, int, float, float]] = []
         self._session = session
-        self._lane_starts_m = lane_starts_m
+        self._road = road
+        self._spans = road.spans()
         self._step_s = rules.control.step_s
         self._exit_m = rules.road.mainline_end_m
         self._correction_steps = max(1, round(CORRECTION_S / self._step_s))
@@ -102,21 +110,26 @@ class CooperativePlant:
         """Lets a vehicle enter at ``step``."""
         if row != len(self.vehicles):
             raise ValueError("rows must enter in order")
-        self.vehicles.append(Driven(arrival.vehicle_id, speed_mps=arrival.speed_mps, since=step))
+        self.vehicles.append(
+            Driven(arrival.vehicle_id, arrival.lane, speed_mps=arrival.speed_mps, since=step)
+        )
         self._session.add(
             arrival.vehicle_id,
             "ramp" if arrival.on_ramp else "mainline",
             cooperative_type(arrival),
             step,
             arrival.speed_mps,
+            arrival.lane,
         )
 
     def follow(
         self, row: int, pieces: FloatArray, merge_time_s: float, lane_change_s: float = math.inf
     ) -> None:
-        """Makes a vehicle follow the pieces from their first time on."""
-        if lane_change_s < math.inf:
-            raise ValueError("plans change lanes on the mainline in the exact engine alone")
+        """Makes a vehicle follow the pieces from their first time on.
+
+        Where it is to change to the next lane further in, it does so in SUMO at once, at the first
+        step from then on.
+        """
         vehicle = self.vehicles[row]
         exit_s = time_at_station(pieces, self._exit_m - BEFORE_EXIT_M)
         last = math.inf
@@ -134,6 +147,10 @@ class CooperativePlant:
             if change >= first:
                 self._push(change, MERGE, following)
                 self._push(change + 1, MEASURE, following)
+        vehicle.lane_change_s = min(vehicle.lane_change_s, lane_change_s)
+        if vehicle.lane_change_s < math.inf:
+            change = first_step_from(vehicle.lane_change_s, self._step_s) - 1
+            self._push(max(change, first - 1), FURTHER_IN, following)
         if first <= last < math.inf:
             self._push(int(last), MEASURE, following)
 
@@ -146,6 +163,8 @@ class CooperativePlant:
             self._command_speed(step, vehicle, following)
         elif kind == MERGE:
             self._merge(step, vehicle, following)
+        elif kind == FURTHER_IN:
+            self._change_further_in(step, vehicle, following)
         elif kind == LOOK:
             self._session.act_now(vehicle.vehicle_id)
         else:
@@ -219,8 +238,23 @@ class CooperativePlant:
         else:  # the first step's travel behind the nose: the lane begins only now
             self._push(step + 1, MERGE, following)
 
+    def _change_further_in(self, step: int, vehicle: Driven, following: Following) -> None:
+        """Has a vehicle change to the next lane further in, once more where it still has not.
+
+        Inside a node SUMO may not carry it out.
+        """
+        lane, _ = self._session.lane_and_position_m(vehicle.vehicle_id)
+        if self._spans[lane].lane > vehicle.lane:
+            self._session.act_now(vehicle.vehicle_id)
+            return
+        if step < following.last:
+            station_m, _ = station_and_speed(following.pieces, (step + 1) * self._step_s)
+            index = self._road.lane_index(vehicle.lane + 1, station_m)
+            self._session.change_lane(vehicle.vehicle_id, index)
+            self._push(step + 1, FURTHER_IN, following)
+
     def _measure(self, vehicle: Driven, planned_m: float) -> float:
         lane, position_m = self._session.lane_and_position_m(vehicle.vehicle_id)
-        error_m = self._lane_starts_m[lane] + position_m - planned_m
+        error_m = self._spans[lane].start_m + position_m - planned_m
         vehicle.largest_error_m = max(vehicle.largest_error_m, abs(error_m))
         return error_m

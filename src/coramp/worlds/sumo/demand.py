@@ -93,10 +93,12 @@ def cooperative_routes(scenario: Scenario, arrivals: Sequence[Arrival], with_veh
 
     With vehicles it is the same demand for plain SUMO.
     """
-    vehicles = []
+    vehicles, step_s = [], scenario.control.step_s
     if with_vehicles:
+        first = None if scenario.has_one_lane else 0
         vehicles = [
-            _vehicle(a, cooperative_type(a), a.speed_mps, scenario.control.step_s) for a in arrivals
+            _vehicle(a, cooperative_type(a), a.speed_mps, step_s, first_lane=first)
+            for a in arrivals
         ]
     return _file(cooperative_types(scenario, arrivals), vehicles)
 
@@ -285,17 +287,22 @@ def _vehicle(
     step_s: float,
     speed_factor: float | None = None,
     road: Ways | None = None,
+    first_lane: int | None = None,
 ) -> str:
+    """The line of a vehicle; ``first_lane`` is the index of its stream's outermost lane.
+
+    Without it none is told; a road tells its own.
+    """
     route = "ramp" if arrival.on_ramp else "mainline"
     if isinstance(road, OriginWays):
         route = road.route_of[arrival.vehicle_id]
-    lane = ""
     factor = "" if speed_factor is None else f' speedFactor="{speed_factor!r}"'
     if road is not None:
         way = road.way(arrival.on_ramp)
-        lane = f' departLane="{way.lane + arrival.lane}"'
+        first_lane = way.lane
         allowed_mps = way.limits.allowed_mps(way.limits.from_m[0])
         speed_mps = min(speed_mps, allowed_mps * min(1.0, speed_factor or 1.0))
+    lane = "" if first_lane is None else f' departLane="{first_lane + arrival.lane}"'
     return (
         f'  <vehicle id="{arrival.vehicle_id}" type="{kind}" route="{route}" '
         f'depart="{arrival.step * step_s:.3f}"{lane} departPos="0" '

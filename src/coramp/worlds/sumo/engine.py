@@ -72,7 +72,7 @@ def _run_cooperative(
             options.gui,
             options.tell,
         ) as session:
-            plant = CooperativePlant(session, plan.lane_starts_m(), rules)
+            plant = CooperativePlant(session, plan, rules)
             channel = Channel(plant)
             coordinator = Coordinator(
                 strategy,

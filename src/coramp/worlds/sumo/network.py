@@ -25,7 +25,12 @@ from coramp.scenarios.model import Scenario
 from coramp.scenarios.sections import DriverPopulation
 
 LANE_WIDTH_M = 3.2
-RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", ":nose_1_0", "merge_0"})
+MOST_LANES = 4
+"""So many lanes the mainline has at most."""
+RAMP_LANES = frozenset({"ramp_0", ":stopline_0_0", "gore_0", "merge_0"}) | frozenset(
+    f":nose_{lanes}_0" for lanes in range(1, MOST_LANES + 1)
+)
+"""The ramp's lanes, on roads of any number of lanes: its link at the nose comes after theirs."""
 RAMP_LANE = -1
 """The number of the ramp and its acceleration lane; those of the mainline count from 0 on."""
 MADE_RAMP = "ramp@merge"
@@ -83,43 +88,48 @@ class RoadPlan:
         return None
 
     def spans(self) -> dict[str, LaneSpan]:
-        """Returns where each lane lies on a road of one mainline lane, as ``lane_starts_m``."""
+        """Returns where each lane lies, as ``lane_starts_m``."""
         found, length_m = {}, self.lane_lengths_m()
         for lane, start_m in self.lane_starts_m().items():
-            number = RAMP_LANE if lane in RAMP_LANES else 0
+            edge, _, index = lane.rpartition("_")
+            number = RAMP_LANE if lane in RAMP_LANES else int(index) - (edge == "merge")
             end_m = start_m + length_m.get(lane, 0.0)
-            found[lane] = LaneSpan(start_m, end_m, 1.0, number, lane == "merge_0")
+            beside = lane in length_m and (number > RAMP_LANE or edge == "merge")
+            found[lane] = LaneSpan(start_m, end_m, 1.0, number, beside and number < self.lanes - 1)
         return found
 
     def lane_lengths_m(self) -> dict[str, float]:
         """Returns the length that each lane must have."""
         lengths_m = {
-            "mainline_0": self.mainline_m,
             "ramp_0": self.ramp_m - self.gore_m,
             "gore_0": self.gore_m,
             "merge_0": self.acceleration_lane_m,
-            "merge_1": self.acceleration_lane_m,
-            "downstream_0": self.downstream_m,
         }
+        for k in range(self.lanes):
+            lengths_m[f"mainline_{k}"] = self.mainline_m
+            lengths_m[f"merge_{k + 1}"] = self.acceleration_lane_m
+            lengths_m[f"downstream_{k}"] = self.downstream_m
         return {lane: length_m for lane, length_m in lengths_m.items() if length_m > 0.0}
 
     def lane_starts_m(self) -> dict[str, float]:
-        """Returns the station at which each lane begins; lanes inside nodes included.
-
-        That is of a road of one mainline lane.
-        """
-        return {
-            "mainline_0": -self.mainline_m,
+        """Returns the station at which each lane begins; lanes inside nodes included."""
+        starts_m = {
             "ramp_0": -self.ramp_m,
             ":stopline_0_0": -self.gore_m,
             "gore_0": -self.gore_m,
-            ":nose_0_0": 0.0,
-            ":nose_1_0": 0.0,
+            f":nose_{self.lanes}_0": 0.0,
             "merge_0": 0.0,
-            "merge_1": 0.0,
-            ":end_0_0": self.acceleration_lane_m,
-            "downstream_0": self.acceleration_lane_m,
         }
+        for k in range(self.lanes):
+            starts_m[f"mainline_{k}"] = -self.mainline_m
+            starts_m[f":nose_0_{k}"] = starts_m[f"merge_{k + 1}"] = 0.0
+            starts_m[f":end_0_{k}"] = self.acceleration_lane_m
+            starts_m[f"downstream_{k}"] = self.acceleration_lane_m
+        return starts_m
+
+    def lane_index(self, number: int, station_m: float) -> int:
+        """Returns SUMO's index of a lane of the mainline, by its number, at a station."""
+        return number + 1 if 0.0 <= station_m < self.acceleration_lane_m else number
 
 
 def road_plan(scenario: Scenario) -> RoadPlan:

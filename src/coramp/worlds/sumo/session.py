@@ -132,14 +132,17 @@ class Session:
         """Returns how many vehicles drive or are still to enter."""
         return int(libsumo.simulation.getMinExpectedNumber())
 
-    def add(self, vehicle_id: str, route: str, kind: str, step: int, speed_mps: float) -> None:
-        """Lets a vehicle enter at ``step`` with its front at the start of its route."""
+    def add(
+        self, vehicle_id: str, route: str, kind: str, step: int, speed_mps: float, lane: int = 0
+    ) -> None:
+        """Lets a vehicle enter at ``step`` with its front at the start of a lane of its route."""
         _check_speed(vehicle_id, speed_mps)
         libsumo.vehicle.add(
             vehicle_id,
             route,
             kind,
             depart=repr(round(step * self._step_s, 6)),
+            departLane=str(lane),
             departPos="0",
             departSpeed=repr(speed_mps),
         )
@@ -273,8 +276,11 @@ class Session:
         self.act_now(vehicle_id)
 
     def change_lane(self, vehicle_id: str, lane: int) -> None:
-        """Commands a lane change at the end of the next step."""
-        libsumo.vehicle.changeLane(vehicle_id, lane, 10.0 * self._step_s)
+        """Commands a change to a lane, by its index, at the end of the next step.
+
+        For that step alone: on the edge behind, the same index may be another lane.
+        """
+        libsumo.vehicle.changeLane(vehicle_id, lane, 0.5 * self._step_s)
         self.act_now(vehicle_id)
 
     def set_signal(self, signal: str, lane: str, colour: str) -> None:
