@@ -25,7 +25,7 @@ NO_SITE = -1
 NO_GAP_M, NOT_ASSERTIVE = 200.0, 0.001
 """With these SUMO finds no gap for a vehicle that is to merge, but has drivers yield."""
 ACTS_RARELY_MPS = 5.0
-"""From this speed on a vehicle drives the same way bit for bit if SUMO lets it act once a second."""
+"""From this speed on a vehicle that acts once a second drives the same way bit for bit."""
 SMOOTHED_OVER_S = 0.5
 """Drivers' accelerations are noisy, and measured through a filter of this time constant."""
 
