@@ -15,6 +15,7 @@ import socket
 import stat
 import subprocess
 import sys
+import threading
 import traceback
 from pathlib import Path
 
@@ -121,6 +122,7 @@ def _code_of_main() -> int:
         code = ended.code
     except BaseException:  # noqa: BLE001 - as Python does where a program ends by one
         traceback.print_exc()
+    threading._shutdown()
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
