@@ -327,3 +327,22 @@ def test_the_next_move_of_a_dial_kills_the_run_before(browser, server, killed):
         assert page.locator("#switched").inner_text() == ""
         assert page.locator("#progress").is_hidden()
         assert "vehicles automated; a perfect world" in page.locator("#world").inner_text()
+
+
+def test_on_several_lanes_what_plans_there_can_be_chosen(tmp_path):
+    file = tmp_path / "two.toml"
+    file.write_text(
+        "[mainline]\nstart_m = -400.0\nend_m = 400.0\nspeed_mps = 20.0\nlanes = 2\n"
+        "flow_veh_h = 2400.0\n[ramp]\nstart_m = -400.0\nspeed_mps = 16.0\n"
+        "acceleration_lane_m = 200.0\nflow_veh_h = 600.0\n"
+    )
+    studio = studio_of(str(file))
+    assert {"mainline-priority", "ramp-priority", "mixed-slots"} <= set(studio.choices)
+    assert "slots" not in studio.choices
+    one, beside = studio.specs({"strategy": "ramp-priority", "second": "mixed-slots"})
+    assert (one.engine, one.is_mixed) == ("sumo", False)
+    assert (beside.engine, beside.is_mixed) == ("sumo", True)
+    with pytest.raises(
+        CorampError, match=r"ramp-priority cannot run where \[traffic\] leaves some"
+    ):
+        studio.specs({"strategy": "ramp-priority", "share": "50"})

@@ -7,12 +7,12 @@ from typing import Any
 
 from coramp.errors import CorampError
 from coramp.records.schemas import Row
-from coramp.runs.mixed import check_mixed, coordinates_drivers
+from coramp.runs.mixed import check_mixed, coordinates_drivers, is_plannable
 from coramp.runs.running import UNCONTROLLED, RunSpec, make_spec
 from coramp.scenarios.corridors import is_corridor
 from coramp.scenarios.loading import load_scenario
 from coramp.scenarios.model import Scenario
-from coramp.strategies.base import Strategy
+from coramp.strategies.base import Strategy, makes_way
 from coramp.strategies.registry import strategies
 from coramp.studio.following import following
 from coramp.studio.world import PERFECT, PRESET_WORDS, share_percent, with_share
@@ -243,7 +243,7 @@ def _is_mixed(scenario: Scenario) -> bool:
 
 def _can_drive(scenario: Scenario, strategy: type[Strategy]) -> bool:
     """Whether a strategy knows the road of a scenario: several lanes or a network, not all do."""
-    if scenario.has_one_lane:
+    if scenario.has_one_lane or (makes_way(strategy) and is_plannable(scenario)):
         return True
     try:
         check_mixed(scenario, strategy, "sumo", scenario.traffic.drivers)
