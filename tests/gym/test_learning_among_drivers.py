@@ -38,14 +38,23 @@ def test_the_table_is_what_policies_drive_now(found, learn):
     assert now == {name: found[name][:1] for name in names}
 
 
-def test_the_median_policy_loses_less_than_random_and_constant_actions(found, learn):
+def test_the_median_policy_loses_less_than_random_actions_and_than_the_fastest(found, learn):
     delay_s = {name: np.array([row["delay_s"] for row in rows]) for name, rows in found.items()}
     trained = [values for name, values in delay_s.items() if name.startswith("trained")]
     median = sorted(trained, key=np.mean)[1]
     less_s, half_s = learn.interval(median - delay_s["random actions"])
     assert less_s + half_s < 0.0
-    for name in ("as fast as it may, merges", "keeps its speed, merges"):
-        assert median.mean() < delay_s[name].mean()
+    assert median.mean() < delay_s["as fast as it may, merges"].mean()
+
+
+def test_mixed_slots_and_keeping_ones_speed_lose_about_the_same(found, learn):
+    """The page says that it comes as far."""
+    delay_s = [
+        np.array([row["delay_s"] for row in found[name]])
+        for name in ("keeps its speed, merges", "mixed-slots")
+    ]
+    beyond_s, half_s = learn.interval(delay_s[0] - delay_s[1])
+    assert abs(beyond_s) < half_s
 
 
 def test_seeds_are_apart(learn):
