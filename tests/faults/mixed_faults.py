@@ -248,7 +248,7 @@ PROMISES = (
         ON_BOARD,
         "            asks[own] = users.speed_mps[own] <= users.speed_mps[ahead]",
         "            asks[own] = True",
-        "tests/worlds/test_asking_for_room.py",
+        f"{OF_BOARD}::test_who_is_faster_than_the_driver_ahead_asks_nobody_for_room",
     ),
     _fault(
         "who merges at the lane's end leaves a driver less than anybody keeps",
