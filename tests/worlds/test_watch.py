@@ -1,6 +1,5 @@
 """What is noted of a run in memory is what SUMO itself writes of it."""
 
-import numpy as np
 import pytest
 
 from coramp.scenarios.loading import load_scenario
@@ -8,7 +7,6 @@ from coramp.strategies.mixed_slots import MixedSlots
 from coramp.worlds.sumo.files import SumoOptions
 from coramp.worlds.sumo.mixed import begun
 from coramp.worlds.sumo.mixed_plant import MixedPlant
-from coramp.worlds.sumo.watch import in_turn
 
 EVERYONE_LEAVES = {"simulation.horizon_s": 15.0}
 CUT_OFF = {"simulation.horizon_s": 15.0, "simulation.drain_s": 5.0}
@@ -68,9 +66,3 @@ def test_who_acts_rarely_drives_the_same_way_bit_for_bit(monkeypatch, tmp_path, 
     assert not always._acts_rarely.any()
     for name in ("vehicle", "lane", "time_s", "station_m", "speed_mps"):
         assert getattr(samples, name).tolist() == getattr(expected, name).tolist()
-
-
-def test_entries_in_turn_are_a_stable_order():
-    number = np.random.default_rng(1).integers(0, 7, 200)
-    assert in_turn(number, 9).tolist() == np.argsort(number, kind="stable").tolist()
-    assert in_turn(np.empty(0, np.int64), 3).tolist() == []

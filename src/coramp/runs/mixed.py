@@ -20,7 +20,7 @@ def coordinates_drivers(strategy: type[Strategy]) -> bool:
 
 
 def plans_in_lanes(scenario: Scenario, strategy: type[Strategy], engine: str) -> bool:
-    """Returns whether a run on several lanes is planned: all vehicles automated, none coordinated.
+    """Returns whether vehicles of a run on several lanes drive by plans, all of them automated.
 
     Raises CorampError where it would be, and the strategy or the road does not allow that.
     """
@@ -28,7 +28,7 @@ def plans_in_lanes(scenario: Scenario, strategy: type[Strategy], engine: str) ->
         return False
     if not makes_way(strategy):
         if engine != "exact":
-            return False  # what drives there in SUMO is told with those that need no plans
+            return False  # ``check_mixed`` tells what can run there in SUMO
         able = ", ".join(name for name, kind in strategies().items() if makes_way(kind))
         raise CorampError(
             f"strategy: {strategy.name} plans for one lane, and mainline.lanes is above 1; "

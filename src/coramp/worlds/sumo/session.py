@@ -278,7 +278,7 @@ class Session:
     def change_lane(self, vehicle_id: str, lane: int) -> None:
         """Commands a change to a lane, by its index, at the end of the next step.
 
-        For that step alone: on the edge behind, the same index may be another lane.
+        For that step alone: on the next edge the same index may be another lane.
         """
         libsumo.vehicle.changeLane(vehicle_id, lane, 0.5 * self._step_s)
         self.act_now(vehicle_id)

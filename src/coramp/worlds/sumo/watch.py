@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coramp._kernel import BoolArray, FloatArray, IntArray, kernel
+from coramp._kernel import BoolArray, FloatArray, IntArray
 from coramp.worlds.sumo.files import Samples
 from coramp.worlds.sumo.network import LaneSpan
 from coramp.worlds.sumo.session import Session
@@ -112,7 +112,7 @@ class Watch:
         at_step = np.frombuffer(self._on_lane, np.int32).reshape(self._steps, lanes).sum(axis=1)
         step_ms = round(MS_A_S * self.step_s)
         time_s = np.repeat(np.arange(self._steps) * step_ms / MS_A_S, at_step)
-        order = in_turn(number, len(self._names))
+        order = np.argsort(number, kind="stable")
         start_m = np.array([span.start_m for span in spans])
         per_m = np.array([span.per_m for span in spans])
         lane = np.array([span.lane for span in spans], np.int64)
@@ -120,18 +120,3 @@ class Watch:
         return Samples(
             number[order], lane[place][order], time_s[order], station_m[order], speed_mps[order]
         )
-
-
-@kernel
-def in_turn(number: IntArray, count: int) -> IntArray:
-    """Returns the entries by number, each number's in their order; numbers are below ``count``."""
-    next_place = np.zeros(count + 1, np.int64)
-    for n in number:
-        next_place[n + 1] += 1
-    for n in range(count):
-        next_place[n + 1] += next_place[n]
-    order = np.empty(len(number), np.int64)
-    for i in range(len(number)):
-        order[next_place[number[i]]] = i
-        next_place[number[i]] += 1
-    return order
